@@ -57,11 +57,10 @@ impl AttainableMoments {
         let variation = |dispersion: f64, factor: f64| factor * dispersion / 14.0_f64.sqrt();
         // An attenuated arrival consists of the pulse's frequencies and somewhat higher ones.
         let (attenuation, center) = (&setup.layers.bone_attenuation, setup.probe.center_frequency);
+        let lowest = VELOCITY_FACTORS.0 * attenuation.speed(center) * bar_velocity_min;
+        let highest = VELOCITY_FACTORS.1 * attenuation.fastest(center) * bulk_velocity_max;
         Self {
-            velocity: (
-                VELOCITY_FACTORS.0 * attenuation.speed(center) * bar_velocity_min,
-                VELOCITY_FACTORS.1 * attenuation.fastest(center) * bulk_velocity_max,
-            ),
+            velocity: (apparent(setup, lowest), apparent(setup, highest)),
             variation: (
                 variation(dispersion.0, VARIATION_FACTORS.0),
                 variation(dispersion.1, VARIATION_FACTORS.1),
@@ -203,9 +202,23 @@ fn span((from, to): (f64, f64), unit: &str) -> String {
     }
 }
 
+/// Returns the velocity, m/s, that a tilted probe shows of a wave along the bone: the way through the
+/// coupling grows or shrinks along the receivers, and both directions together do not see it.
+fn apparent(setup: &Setup, velocity: f64) -> f64 {
+    let probe = &setup.probe;
+    if probe.tilt == 0.0 {
+        return velocity;
+    }
+    let (sin, cos) = libm::sincos(probe.tilt);
+    let across = sampling::slowness(setup.layers.coupling.sound_speed, velocity);
+    let across = if probe.bidirectional { 0.0 } else { sin * across };
+    let slowness = cos / velocity + across;
+    if slowness > 0.0 { 1.0 / slowness } else { f64::INFINITY }
+}
+
 fn is_near(setup: &Setup) -> bool {
-    let heights = setup.probe.source.x3 + setup.probe.receivers.x3;
-    let nearest = sampling::distances(setup).fold(f64::INFINITY, f64::min);
+    let heights = setup.probe.source.x3 + setup.probe.lowest_receiver();
+    let (nearest, _) = sampling::nearest_and_farthest(setup);
     nearest < NEAR_FACTOR * heights
 }
 

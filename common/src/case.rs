@@ -35,6 +35,15 @@ impl Setup {
     }
 }
 
+impl Setup {
+    /// Returns path and name of what only the exact method computes, if the setup has any of it.
+    pub fn only_exact(&self) -> Option<(&'static str, &'static str)> {
+        let attenuated = self.layers.attenuated().map(|field| (field, "attenuation"));
+        let tilted = (self.probe.tilt != 0.0).then_some(("probe.tilt", "tilt"));
+        attenuated.or(tilted)
+    }
+}
+
 /// The bone's material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bone {

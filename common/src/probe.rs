@@ -5,6 +5,8 @@ use crate::fields::{Fields, Key, Number, Section};
 use crate::limits::{RECEIVERS_MAX, RECEIVERS_MIN};
 use crate::plausible::{FREQUENCY, HEIGHT, PITCH};
 
+/// Largest accepted tilt, rad: 11°, far more than any operator's hand.
+const TILT_MAX: f64 = 0.2;
 /// Meaning of the key `amplitude`.
 const AMPLITUDE: &str = "amplitude F1 of the pulse (the paper gives it in N; \
                          [physics.md](physics.md#the-medium) explains the dimension)";
@@ -60,6 +62,55 @@ pub struct Probe {
     pub source: Source,
     /// The receivers.
     pub receivers: Receivers,
+    /// Angle, rad, by which the probe is turned about the source: if it is positive, receivers are
+    /// the higher, the farther they are from the source.
+    pub tilt: f64,
+    /// Whether a second source emits, too, as far beyond the last receiver as the first is before the
+    /// first one.
+    pub bidirectional: bool,
+}
+
+/// Position of a receiver as seen from the source.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Distance from the source along the bone, m.
+    pub x: f64,
+    /// Height above the bone's upper face, m.
+    pub x3: f64,
+}
+
+impl Probe {
+    /// Returns the distances of the receivers from the source along the probe, m.
+    pub fn distances(&self) -> impl Iterator<Item = f64> + '_ {
+        self.receivers.positions().map(|x1| (x1 - self.source.x1).abs())
+    }
+
+    /// Returns the places of the receivers. The probe is rigid, also where source and receivers have
+    /// different heights.
+    pub fn places(&self) -> impl Iterator<Item = Place> + '_ {
+        let (sin, cos) = libm::sincos(self.tilt);
+        let across = self.receivers.x3 - self.source.x3;
+        self.distances().map(move |distance| Place {
+            x: distance * cos - across * sin,
+            x3: self.receivers.x3 + distance * sin - across * (1.0 - cos),
+        })
+    }
+
+    /// Returns the height of the lowest receiver, m.
+    pub fn lowest_receiver(&self) -> f64 {
+        self.places().map(|place| place.x3).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Returns the probe as its second source sees it: the bone is turned round, which changes no
+    /// velocity, so that the receivers' distances are the same.
+    pub fn from_other_side(&self) -> Self {
+        let (first, last) = (self.receivers.x1(0), self.receivers.x1(self.receivers.count - 1));
+        let apart = (first - self.source.x1).abs() + (last - self.source.x1).abs();
+        let rise = apart * libm::sin(self.tilt);
+        let source = Source { x3: self.source.x3 + rise, ..self.source };
+        let receivers = Receivers { x3: self.receivers.x3 + rise, ..self.receivers };
+        Self { source, receivers, tilt: -self.tilt, ..*self }
+    }
 }
 
 impl Default for Probe {
@@ -71,6 +122,8 @@ impl Default for Probe {
             amplitude: 100.0,
             source: Source { x1: 0.0, x3: 2e-3 },
             receivers: Receivers { first_x1: 11e-3, pitch: 0.8e-3, count: 14, x3: 2e-3 },
+            tilt: 0.0,
+            bidirectional: false,
         }
     }
 }
@@ -95,6 +148,19 @@ impl Section for Probe {
         fields.table(Key { name: "receivers", meaning: receivers }, &mut |fields| {
             self.receivers.declare(fields);
         });
+        let tilt = "angle by which the probe is turned about the source; positive if receivers farther \
+                    from it are higher";
+        fields.number(
+            Key { name: "tilt", meaning: tilt },
+            &mut self.tilt,
+            Number::within(Interval::from_to(-TILT_MAX, TILT_MAX, "rad")),
+        );
+        let bidirectional = "whether a second source at the other end emits, too: the velocity is then \
+                             the harmonic mean of both directions";
+        fields.boolean(
+            Key { name: "bidirectional", meaning: bidirectional },
+            &mut self.bidirectional,
+        );
     }
 }
 

@@ -26,12 +26,13 @@ use std::f64::consts::PI;
 
 use crate::case::Setup;
 use crate::limits::SAMPLING_PAIRS_MAX;
+use crate::probe::Place;
 use crate::settings::Method;
 use arrivals::{is_audible, lower_echo, reflected_arrival, upper_echo};
 
 pub use arrivals::{
-    direct_arrival, distances, earliest_arrival, earliest_echo, echoes_are_audible, fastest,
-    fastest_in, slowness,
+    direct_arrival, earliest_arrival, earliest_echo, echoes_are_audible, fastest, fastest_in,
+    nearest_and_farthest, slowness,
 };
 pub use thinning::{FrequencyRun, RUN, smooth_step};
 
@@ -240,10 +241,10 @@ impl WaveSampling {
         let damping = wrap_damping(setup, grade);
         let mut longest = SHORTEST_PERIOD / fc;
         let mut last = 0.0_f64;
-        for x in distances(setup) {
-            let earliest = earliest_arrival(setup, x, speed);
-            let direct = direct_arrival(setup, x);
-            let reflected = reflected_arrival(setup, x) + reflected_length / fc;
+        for place in setup.probe.places() {
+            let earliest = earliest_arrival(setup, place, speed);
+            let direct = direct_arrival(setup, place);
+            let reflected = reflected_arrival(setup, place) + reflected_length / fc;
             let pick = direct.min(earliest + latest_pick / fc);
             longest = longest
                 .max(PERIOD_MARGIN * (reflected - earliest))
@@ -278,8 +279,9 @@ impl WaveSampling {
     fn new(setup: &Setup, grade: Grade, damping: f64, speed: f64, period: f64, last: f64) -> Self {
         let refinement = setup.solver.refinement;
         let coupling = &setup.layers.coupling;
-        let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
-        let farthest = distances(setup).fold(0.0, f64::max);
+        let lowest = setup.probe.lowest_receiver();
+        let heights = lowest + setup.probe.source.x3;
+        let (_, farthest) = nearest_and_farthest(setup);
         let fc = setup.probe.center_frequency;
         let bands = relative_bands(grade, refinement, thinness(setup));
         let unit = match grade {
@@ -296,7 +298,7 @@ impl WaveSampling {
             }
         };
         let unit = unit * crowding(setup, speed) * (THINNED_PERIOD / (period * fc)).max(1.0);
-        let through_fluid = earliest_arrival(setup, 0.0, speed);
+        let through_fluid = earliest_arrival(setup, Place { x: 0.0, x3: lowest }, speed);
         let length = farthest + speed * (last - through_fluid).max(0.0) + heights;
         Self {
             speed,
@@ -433,8 +435,8 @@ fn crowding(setup: &Setup, speed: f64) -> f64 {
     if end >= 1.0 {
         return 1.0;
     }
-    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
-    let nearest = distances(setup).fold(f64::INFINITY, f64::min);
+    let heights = setup.probe.lowest_receiver() + setup.probe.source.x3;
+    let (nearest, _) = nearest_and_farthest(setup);
     // Slowness relative to that of the fluid, along and across.
     let across = |along: f64| (1.0 - along * along).sqrt();
     let apart = nearest * (end - start) - heights * (across(start) - across(end));

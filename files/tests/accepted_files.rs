@@ -2,8 +2,8 @@
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a helper of tests fails the test")]
 
-#[path = "support/lossless.rs"]
-mod lossless;
+#[path = "support/hybrid_job.rs"]
+mod hybrid_job;
 
 use std::path::{Path, PathBuf};
 
@@ -67,6 +67,8 @@ const DEFAULT_SETUP: Setup = Setup {
         amplitude: 100.0,
         source: Source { x1: 0.0, x3: 2e-3 },
         receivers: Receivers { first_x1: 11e-3, pitch: 0.8e-3, count: 14, x3: 2e-3 },
+        tilt: 0.0,
+        bidirectional: false,
     },
     picking: Picking { extremum: Extremum::First, threshold: 0.05 },
     solver: SolverSettings {
@@ -235,6 +237,8 @@ fn a_complete_job_means_what_it_says() {
                 amplitude: 99.0,
                 source: Source { x1: 1e-3, x3: 3e-3 },
                 receivers: Receivers { first_x1: 13e-3, pitch: 0.9e-3, count: 12, x3: 2.5e-3 },
+                tilt: 0.001,
+                bidirectional: true,
             },
             picking: Picking { extremum: Extremum::Second, threshold: 0.06 },
             solver: SolverSettings { refinement: 1.5, ..SolverSettings::default() },
@@ -309,7 +313,7 @@ fn values_at_the_edges_are_accepted() {
         assert_eq!(text.matches(from).count(), 1, "{from} must occur once");
         let mut text = text.replace(from, to);
         if to.contains("hybrid") {
-            text = lossless::without_attenuation(&text);
+            text = hybrid_job::without_exact_only(&text);
         }
         job(&text, Format::Toml, JobKind::Identification);
     }

@@ -2,8 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
 
-#[path = "support/lossless.rs"]
-mod lossless;
+#[path = "support/hybrid_job.rs"]
+mod hybrid_job;
 mod support;
 
 use std::path::Path;
@@ -35,7 +35,7 @@ fn edited(from: &str, to: &str) -> String {
     let edited = JOB.replace(from, to);
     // With keys of the method "hybrid", what is refused is one of them.
     let of_hybrid = to.starts_with("method = \"hybrid\"\n");
-    if of_hybrid { lossless::without_attenuation(&edited) } else { edited }
+    if of_hybrid { hybrid_job::without_exact_only(&edited) } else { edited }
 }
 
 fn refusal(text: &str, kind: JobKind) -> String {
@@ -74,6 +74,9 @@ fn setup() {
             ("center_frequency = 0.9e6", "center_frequency = 0"),
             ("center_frequency = 0.9e6", "center_frequency = 1e12"),
             ("amplitude        = 99.0", "amplitude = 1e400"),
+            ("tilt = 0.001", "tilt = 1.0"),
+            ("tilt = 0.001", "tilt = -0.2"),
+            ("bidirectional = true", "bidirectional = \"both\""),
             ("x1 = 1e-3, x3 = 3e-3", "x1 = nan, x3 = 0.0"),
             ("x3 = 3e-3", "x3 = 11e-3"),
             ("x3 = 2.5e-3", "x3 = -2.5e-3"),
@@ -279,7 +282,7 @@ fn a_posterior_needs_two_realizations() {
             edited(sampling, "realizations = 1").replace("\"simplex\"", &format!("\"{method}\""));
         assert_eq!(
             refusal(&format!("{text}\n{section}"), JobKind::Identification),
-            "1 error\n  line 52: monte_carlo.realizations: is 1; a posterior needs the law of \
+            "1 error\n  line 54: monte_carlo.realizations: is 1; a posterior needs the law of \
              velocities that differ, so at least 2"
         );
     }

@@ -70,14 +70,14 @@ fn setup() -> impl Strategy<Value = Setup> {
     let heights = (0.5e-3..3.9e-3, 0.5e-3..3.9e-3);
     let receivers = (5e-3..20e-3, 0.2e-3..1e-3, 3_u32..=32, any::<bool>());
     let pulse = (0.5e6..1.5e6, positive());
-    let settings = (any::<bool>(), 1e-300..1.0, solver());
+    let settings = (any::<bool>(), 1e-300..1.0, solver(), any::<bool>());
     (layers, -10e-3..10e-3, heights, receivers, pulse, settings).prop_map(
         |(layers, x1, (x3, receivers_x3), row, pulse, settings)| {
             let (mut coupling, bone_thickness, mut marrow, mut attenuations) = layers;
             let (distance, pitch, count, left) = row;
             let span = f64::from(count) * pitch;
             let first_x1 = if left { x1 - distance - span } else { x1 + distance };
-            let (second, threshold, solver) = settings;
+            let (second, threshold, solver, bidirectional) = settings;
             let extremum = if second { Extremum::Second } else { Extremum::First };
             if solver.method == Method::Hybrid {
                 attenuations = [Attenuation::default(); 3];
@@ -91,6 +91,9 @@ fn setup() -> impl Strategy<Value = Setup> {
                     amplitude: pulse.1,
                     source: Source { x1, x3 },
                     receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },
+                    // Heights change by a few micrometres.
+                    tilt: if solver.method == Method::Exact { -0.02 * x1 } else { 0.0 },
+                    bidirectional,
                 },
                 picking: Picking { extremum, threshold },
                 solver,

@@ -1,7 +1,7 @@
 //! What is accepted with a warning, and what without.
 
-#[path = "support/lossless.rs"]
-mod lossless;
+#[path = "support/hybrid_job.rs"]
+mod hybrid_job;
 
 use std::path::Path;
 
@@ -98,7 +98,7 @@ fn unusual_numbers_of_a_job_are_accepted_with_a_warning() {
     ] {
         let mut text = edited(JOB, from, to);
         if to.contains("hybrid") {
-            text = lossless::without_attenuation(&text);
+            text = hybrid_job::without_exact_only(&text);
         }
         let parsed = job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification);
         assert_eq!(shown(&job_warnings(&parsed.unwrap())), [expected], "{to}");

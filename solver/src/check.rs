@@ -29,8 +29,8 @@ pub struct MethodSolution {
 pub struct Check {
     /// The exact method at the case's refinement.
     pub exact: MethodSolution,
-    /// The hybrid method with the case's discretisation; none of a case with attenuation, which that
-    /// method does not compute.
+    /// The hybrid method with the case's discretisation; none of a case with attenuation or tilt, which
+    /// that method does not compute.
     pub hybrid: Option<MethodSolution>,
     /// The exact method at five times the case's refinement, at most 16.
     pub refined: MethodSolution,
@@ -46,7 +46,7 @@ impl Check {
             (setup, arrival)
         };
         let [exact, hybrid, refined] = settings(&case.setup.solver);
-        let hybrid = case.setup.layers.attenuated().is_none().then(|| solve(hybrid));
+        let hybrid = case.setup.only_exact().is_none().then(|| solve(hybrid));
         let [exact, refined] = [exact, refined].map(&mut solve);
         let reference = refined.1.clone();
         let solution = |(setup, arrival): (Setup, _)| {

@@ -26,6 +26,7 @@ pub(crate) mod signal;
 pub mod stages;
 pub(crate) mod table_cache;
 pub(crate) mod tables;
+pub(crate) mod tilted;
 pub(crate) mod traces;
 
 use std::ops::Range;
@@ -33,6 +34,7 @@ use std::sync::Arc;
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::FailureKind;
+use osteon_common::probe::Place;
 use osteon_common::sampling::{self, Grade, OuterFaces};
 
 use crate::exact::pass::{Band, BinTables, Estimated, ExactWorkspace, slow_decay};
@@ -80,7 +82,9 @@ const SAME_EXTREMUM: f64 = 0.05;
 #[derive(Debug)]
 pub(crate) struct Exact {
     setup: Setup,
+    /// Distances of the receivers along the probe, m.
     distances: Vec<f64>,
+    places: Vec<Place>,
     isa: Isa,
     without_faces: GradeCaches,
     with_faces: GradeCaches,
@@ -96,14 +100,15 @@ struct GradeCaches {
 }
 
 impl Exact {
-    pub(crate) fn new(setup: &Setup, isa: Isa) -> Self {
-        let memory = Arc::new(TableMemory::default());
+    /// Creates the method with `memory` for its tables.
+    pub(crate) fn new(setup: &Setup, isa: Isa, memory: &Arc<TableMemory>) -> Self {
         Self {
             setup: *setup,
-            distances: sampling::distances(setup).collect(),
+            distances: setup.probe.distances().collect(),
+            places: setup.probe.places().collect(),
             isa,
-            without_faces: GradeCaches::new(setup, OuterFaces::None, &memory),
-            with_faces: GradeCaches::new(setup, OuterFaces::Audible, &memory),
+            without_faces: GradeCaches::new(setup, OuterFaces::None, memory),
+            with_faces: GradeCaches::new(setup, OuterFaces::Audible, memory),
         }
     }
 
@@ -196,7 +201,8 @@ impl Exact {
 
     /// Returns the least time from a pick to the earliest possible echo, in periods.
     fn time_to_echo(&self, found: &Estimated, speed: f64) -> f64 {
-        let echoes = self.distances.iter().map(|&x| sampling::earliest_echo(&self.setup, x, speed));
+        let echo = |&place: &Place| sampling::earliest_echo(&self.setup, place, speed);
+        let echoes = self.places.iter().map(echo);
         let times = echoes.zip(&found.pick.times).map(|(echo, t)| echo - t);
         times.fold(f64::INFINITY, f64::min) * self.setup.probe.center_frequency
     }
@@ -206,9 +212,9 @@ impl Exact {
     fn fallback_weight(&self, found: &Estimated, speed: f64) -> f64 {
         let fc = self.setup.probe.center_frequency;
         let (mut delay, mut margin) = (0.0_f64, f64::INFINITY);
-        for (&x, t) in self.distances.iter().zip(&found.pick.times) {
-            delay = delay.max(t - sampling::earliest_arrival(&self.setup, x, speed));
-            margin = margin.min(sampling::direct_arrival(&self.setup, x) - t);
+        for (&place, t) in self.places.iter().zip(&found.pick.times) {
+            delay = delay.max(t - sampling::earliest_arrival(&self.setup, place, speed));
+            margin = margin.min(sampling::direct_arrival(&self.setup, place) - t);
         }
         let ratio = found.pick.ratio / self.setup.picking.threshold;
         let skipped = found.pick.skipped / self.setup.picking.threshold;

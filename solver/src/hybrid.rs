@@ -45,7 +45,6 @@ mod stepping;
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::Outcome;
-use osteon_common::sampling;
 
 #[cfg(feature = "measure")]
 pub use self::convergence::{ConvergenceRow, element_convergence, time_step_convergence};
@@ -82,7 +81,7 @@ impl Hybrid {
 
     /// Same as [`new`](Self::new), on one instruction set. The bits do not depend on it.
     pub fn with_isa(setup: &Setup, isa: Isa) -> Self {
-        Self { setup: *setup, distances: sampling::distances(setup).collect(), isa }
+        Self { setup: *setup, distances: setup.probe.distances().collect(), isa }
     }
 
     /// Returns the setup.

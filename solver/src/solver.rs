@@ -1,5 +1,7 @@
 //! Computes the velocity of one realization by the method that the setup requests.
 
+use std::sync::Arc;
+
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
 use osteon_common::realization::Ensemble;
@@ -8,6 +10,7 @@ use osteon_common::settings::Method;
 
 use crate::exact::Exact;
 use crate::exact::pass::ExactWorkspace;
+use crate::exact::table_cache::TableMemory;
 use crate::hybrid::{Hybrid, HybridWorkspace};
 use crate::isa::Isa;
 
@@ -17,6 +20,9 @@ pub struct Solver {
     setup: Setup,
     isa: Isa,
     exact: Exact,
+    /// The exact method as a second source sees the bone; `None` if there is none, or if it would see the
+    /// same.
+    reversed: Option<Exact>,
     hybrid: Hybrid,
 }
 
@@ -30,9 +36,12 @@ pub struct Workspace {
 /// A picked first arrival.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arrival {
-    /// Velocity of the first arriving signal, m/s.
+    /// Velocity of the first arriving signal, m/s; of a bidirectional probe the harmonic mean of both
+    /// directions.
     pub velocity: f64,
-    /// Time of the picked extremum at each receiver, s.
+    /// Velocities from the first source and from the second, m/s, of a bidirectional probe.
+    pub directions: Option<[f64; 2]>,
+    /// Time of the picked extremum at each receiver, s, from the first source.
     pub times: Vec<f64>,
     /// Estimate of the velocity's relative error by discretisation, ≥ 0.
     pub estimated_error: f64,
@@ -72,6 +81,27 @@ pub struct Failure {
     pub detail: String,
 }
 
+impl Arrival {
+    /// Combines the arrivals of both directions. Both errors may have the same sign.
+    fn with(self, other: &Self) -> Self {
+        let [one, two] = [self.velocity, other.velocity];
+        let passes = self.passes.zip(other.passes).map(|(one, two)| PassSummary {
+            count: one.count + two.count,
+            pairs_computed: one.pairs_computed + two.pairs_computed,
+            last: one.last,
+        });
+        // The slownesses weigh the errors.
+        let error = (self.estimated_error * two + other.estimated_error * one) / (one + two);
+        Self {
+            velocity: 2.0 / (1.0 / one + 1.0 / two),
+            directions: Some([one, two]),
+            estimated_error: error,
+            passes,
+            ..self
+        }
+    }
+}
+
 impl Solver {
     /// Creates a solver for cases of `setup`, which has passed validation.
     pub fn new(setup: &Setup) -> Self {
@@ -80,10 +110,17 @@ impl Solver {
 
     /// Same as [`new`](Self::new), on one instruction set. The bits do not depend on it.
     pub fn with_isa(setup: &Setup, isa: Isa) -> Self {
+        let memory = Arc::new(TableMemory::default());
+        let probe = &setup.probe;
+        let reversed = (probe.bidirectional && probe.tilt != 0.0).then(|| {
+            let reversed = Setup { probe: probe.from_other_side(), ..*setup };
+            Exact::new(&reversed, isa, &memory)
+        });
         Self {
             setup: *setup,
             isa,
-            exact: Exact::new(setup, isa),
+            exact: Exact::new(setup, isa, &memory),
+            reversed,
             hybrid: Hybrid::with_isa(setup, isa),
         }
     }
@@ -121,9 +158,22 @@ impl Solver {
     /// # Errors
     /// The failure, if the case has no velocity.
     pub fn arrival(&self, bone: &Bone, workspace: &mut Workspace) -> Result<Arrival, Failure> {
-        match self.setup.solver.method {
+        let found = match self.setup.solver.method {
             Method::Exact => self.exact.arrival(bone, &mut workspace.exact),
             Method::Hybrid => self.hybrid.arrival(bone, &mut workspace.hybrid),
+        }?;
+        if !self.setup.probe.bidirectional {
+            return Ok(found);
+        }
+        let Some(reversed) = &self.reversed else {
+            // By reciprocity a plate is the same from both sides.
+            return Ok(Arrival { directions: Some([found.velocity; 2]), ..found });
+        };
+        match reversed.arrival(bone, &mut workspace.exact) {
+            Ok(other) => Ok(found.with(&other)),
+            Err(Failure { kind, detail }) => {
+                Err(Failure { kind, detail: format!("from the second source: {detail}") })
+            }
         }
     }
 
@@ -157,9 +207,10 @@ impl Solver {
 /// Refuses, before anything is computed, bones through which no wave can arrive first; `speed`
 /// (m/s) is an upper bound of the speed of every wave.
 pub(crate) fn check_direct_wave(setup: &Setup, speed: f64) -> Result<(), Failure> {
-    for (r, x) in sampling::distances(setup).enumerate() {
-        let earliest = sampling::earliest_arrival(setup, x, speed);
-        let direct = sampling::direct_arrival(setup, x);
+    for (r, place) in setup.probe.places().enumerate() {
+        let x = place.x;
+        let earliest = sampling::earliest_arrival(setup, place, speed);
+        let direct = sampling::direct_arrival(setup, place);
         if earliest >= direct {
             return Err(Failure {
                 kind: FailureKind::DirectWaveFirst,

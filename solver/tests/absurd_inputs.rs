@@ -37,6 +37,13 @@ fn fluid() -> impl Strategy<Value = Fluid> {
     )
 }
 
+/// Returns a tilt with which neither source nor receivers reach a face of the coupling.
+fn largest_tilt(heights: (f64, f64), thickness: f64, row: (f64, f64, u32)) -> f64 {
+    let across = heights.0.min(heights.1).min(1.0 - heights.0.max(heights.1)) * thickness;
+    let along = 2.0 * row.0 + row.1 * f64::from(row.2) + thickness;
+    (across / along).min(0.2)
+}
+
 /// Receivers from 1 mm to 50 mm, rarely much nearer, up to 64 of them, up to 10 mm apart.
 fn setup() -> impl Strategy<Value = Setup> {
     let probe = (
@@ -47,12 +54,20 @@ fn setup() -> impl Strategy<Value = Setup> {
             decades(-4.0, -2.0),
             3_u32..=64,
         ),
+        (prop_oneof![2 => Just(0.0), 1 => -0.9..0.9], any::<bool>()),
     );
     let plate = prop_oneof![1 => decades(-6.0, -3.3), 3 => decades(-3.3, -2.09)];
     (fluid(), plate, fluid(), probe).prop_map(
-        |(coupling, bone_thickness, marrow, (center_frequency, heights, row))| Setup {
+        |(
+            coupling,
+            bone_thickness,
+            marrow,
+            (center_frequency, heights, row, (share, bidirectional)),
+        )| Setup {
             layers: Layers { coupling, bone_thickness, marrow, ..Layers::default() },
             probe: Probe {
+                tilt: share * largest_tilt(heights, coupling.thickness, row),
+                bidirectional,
                 center_frequency,
                 amplitude: 100.0,
                 source: Source { x1: 0.0, x3: heights.0 * coupling.thickness },

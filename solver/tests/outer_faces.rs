@@ -30,7 +30,8 @@ fn arrival(thicknesses: [f64; 2], bone: &Bone) -> Result<Arrival, Failure> {
 /// Returns the least time from a pick to the earliest possible echo, in periods.
 fn time_to_echo(setup: &Setup, bone: &Bone, times: &[f64]) -> f64 {
     let speed = fastest_wave(bone).max(setup.layers.marrow.sound_speed);
-    let echoes = sampling::distances(setup).map(|x| sampling::earliest_echo(setup, x, speed));
+    let places = setup.probe.places();
+    let echoes = places.map(|place| sampling::earliest_echo(setup, place, speed));
     let least = echoes.zip(times).map(|(echo, t)| echo - t).fold(f64::INFINITY, f64::min);
     least * setup.probe.center_frequency
 }

@@ -104,6 +104,7 @@ pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
     });
     let written = Simulation {
         velocity: found.map(|arrival| arrival.velocity),
+        directions: found.and_then(|arrival| arrival.directions),
         failure: failed.map(|failure| failure.kind),
         detail: failed.map(|failure| failure.detail.clone()),
         receivers: receivers.collect(),

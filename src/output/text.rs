@@ -169,6 +169,12 @@ fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
         }
     };
     if let Ok(arrival) = simulation.arrival {
+        if let Some(directions) = arrival.directions {
+            let [one, two] = directions.map(|velocity| digits(velocity, VELOCITY_DIGITS));
+            text.push_str(&wrapped(&format!(
+                "harmonic mean of {one} m/s from the first source and {two} m/s from the second"
+            )));
+        }
         text.push_str("\nreceiver  x1 (mm)   time (µs)\n");
         let positions = simulation.setup.probe.receivers.positions();
         for (j, (x1, time)) in positions.zip(&arrival.times).enumerate() {

@@ -24,6 +24,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
     }
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);
+    tilted(setup, violations);
     method(setup, violations);
     sampling(setup, violations);
 }
@@ -91,15 +92,58 @@ fn one_side(probe: &Probe, violations: &mut Violations) {
     }
 }
 
+/// Checks that a tilted probe remains inside fluid 1, and in front of its source.
+fn tilted(setup: &Setup, violations: &mut Violations) {
+    let probe = &setup.probe;
+    let known_wrong = ["probe", "layers.coupling.thickness"]
+        .iter()
+        .any(|field| violations.has_at_or_below(field));
+    if known_wrong || probe.tilt == 0.0 {
+        return;
+    }
+    let top = setup.layers.coupling.thickness;
+    let sides = [*probe, probe.from_other_side()];
+    for probe in &sides[..if probe.bidirectional { 2 } else { 1 }] {
+        let heights = || probe.places().map(|place| place.x3).chain([probe.source.x3]);
+        let lowest = heights().fold(f64::INFINITY, f64::min);
+        let highest = heights().fold(f64::NEG_INFINITY, f64::max);
+        if !(lowest > 0.0 && highest < top) {
+            violations.add(
+                "probe.tilt",
+                format!(
+                    "is {:?}; source and receivers would be {lowest:.2e} to {highest:.2e} m above the \
+                     bone, and must be inside the coupling layer, 0 to {top:?} m: lower the tilt, \
+                     raise probe.source.x3 and probe.receivers.x3, or enlarge \
+                     layers.coupling.thickness",
+                    setup.probe.tilt
+                ),
+            );
+            return;
+        }
+    }
+    if probe.places().any(|place| place.x <= 0.0) {
+        violations.add(
+            "probe.tilt",
+            format!(
+                "is {:?}; a receiver would be on the other side of the source: lower the tilt, or \
+                 bring probe.source.x3 and probe.receivers.x3 nearer to each other",
+                probe.tilt
+            ),
+        );
+    }
+}
+
 /// Checks that the method computes what is asked for.
 fn method(setup: &Setup, violations: &mut Violations) {
-    let Some(field) = setup.layers.attenuated() else { return };
+    let Some((field, name)) = setup.only_exact() else { return };
     match setup.solver.method {
         Method::Exact => {}
         Method::Hybrid => violations.add(
             field,
-            "the method \"hybrid\" computes no attenuation; leave it out, or set solver.method = \
-             \"exact\"",
+            format!(
+                "the method \"hybrid\" computes no {name}; leave it out, or set solver.method = \
+                 \"exact\""
+            ),
         ),
     }
 }

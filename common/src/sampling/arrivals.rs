@@ -2,6 +2,7 @@
 
 use crate::case::Setup;
 use crate::layers::Fluid;
+use crate::probe::Place;
 
 /// Returns the highest speed, m/s, of waves along the bone, in which none is faster than `in_bone` (m/s)
 /// at the reference frequency of its attenuation.
@@ -16,23 +17,23 @@ pub fn fastest_in(fluid: &Fluid, setup: &Setup) -> f64 {
     fluid.sound_speed * fluid.attenuation.fastest(setup.probe.center_frequency)
 }
 
-/// Returns the earliest possible arrival, s, at horizontal distance `x` (m) of a wave that travels
-/// along the bone at `speed` (m/s) and through the coupling fluid at its ends.
+/// Returns the earliest possible arrival, s, at a receiver's place of a wave that travels along the
+/// bone at `speed` (m/s) and through the coupling fluid at its ends.
 ///
 /// It is a lower bound at every distance: within the critical one the reflected wave arrives later.
-pub fn earliest_arrival(setup: &Setup, x: f64, speed: f64) -> f64 {
+pub fn earliest_arrival(setup: &Setup, place: Place, speed: f64) -> f64 {
     let c1 = setup.layers.coupling.sound_speed;
-    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
+    let heights = place.x3 + setup.probe.source.x3;
     if speed <= c1 {
-        return reflected_arrival(setup, x);
+        return reflected_arrival(setup, place);
     }
-    x / speed + heights * slowness(c1, speed)
+    place.x / speed + heights * slowness(c1, speed)
 }
 
-/// Returns the earliest possible arrival, s, at horizontal distance `x` (m) of a reflection of an outer
-/// face, for waves along the bone up to `speed` (m/s): a lower bound.
-pub fn earliest_echo(setup: &Setup, x: f64, speed: f64) -> f64 {
-    upper_echo(setup, x, speed).min(lower_echo(setup, x, speed))
+/// Returns the earliest possible arrival, s, at a receiver's place of a reflection of an outer face, for
+/// waves along the bone up to `speed` (m/s): a lower bound.
+pub fn earliest_echo(setup: &Setup, place: Place, speed: f64) -> f64 {
+    upper_echo(setup, place, speed).min(lower_echo(setup, place, speed))
 }
 
 /// Returns whether a reflection of an outer face can arrive before the direct wave at some receiver,
@@ -41,15 +42,18 @@ pub fn echoes_are_audible(setup: &Setup, speed: f64) -> bool {
     is_audible(setup, speed, earliest_echo)
 }
 
-/// Returns the arrival, s, of the direct wave in the coupling fluid at horizontal distance `x` (m).
-pub fn direct_arrival(setup: &Setup, x: f64) -> f64 {
-    let across = setup.probe.receivers.x3 - setup.probe.source.x3;
+/// Returns the arrival, s, of the direct wave in the coupling fluid at a receiver's place.
+pub fn direct_arrival(setup: &Setup, place: Place) -> f64 {
+    let (x, across) = (place.x, place.x3 - setup.probe.source.x3);
     x.mul_add(x, across * across).sqrt() / setup.layers.coupling.sound_speed
 }
 
-/// Returns the horizontal distances of the receivers from the source, m.
-pub fn distances(setup: &Setup) -> impl Iterator<Item = f64> + '_ {
-    setup.probe.receivers.positions().map(|x1| (x1 - setup.probe.source.x1).abs())
+/// Returns the smallest and the largest distance of a receiver from the source along the bone, m.
+pub fn nearest_and_farthest(setup: &Setup) -> (f64, f64) {
+    let of = |(nearest, farthest): (f64, f64), place: Place| {
+        (nearest.min(place.x), farthest.max(place.x))
+    };
+    setup.probe.places().fold((f64::INFINITY, 0.0), of)
 }
 
 /// Returns √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at
@@ -59,28 +63,26 @@ pub fn slowness(c: f64, v: f64) -> f64 {
 }
 
 /// Returns whether what arrives at the time that `echo` gives is before the direct wave at some receiver.
-pub(super) fn is_audible(setup: &Setup, speed: f64, echo: fn(&Setup, f64, f64) -> f64) -> bool {
-    distances(setup).any(|x| echo(setup, x, speed) <= direct_arrival(setup, x))
+pub(super) fn is_audible(setup: &Setup, speed: f64, echo: fn(&Setup, Place, f64) -> f64) -> bool {
+    setup.probe.places().any(|place| echo(setup, place, speed) <= direct_arrival(setup, place))
 }
 
-/// Returns the arrival, s, at horizontal distance `x` (m) of the wave reflected by the bone's upper
-/// face.
-pub(super) fn reflected_arrival(setup: &Setup, x: f64) -> f64 {
-    let heights = setup.probe.receivers.x3 + setup.probe.source.x3;
+/// Returns the arrival, s, at a receiver's place of the wave reflected by the bone's upper face.
+pub(super) fn reflected_arrival(setup: &Setup, place: Place) -> f64 {
+    let (x, heights) = (place.x, place.x3 + setup.probe.source.x3);
     x.mul_add(x, heights * heights).sqrt() / setup.layers.coupling.sound_speed
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the coupling's outer face.
-pub(super) fn upper_echo(setup: &Setup, x: f64, speed: f64) -> f64 {
-    let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
+pub(super) fn upper_echo(setup: &Setup, place: Place, speed: f64) -> f64 {
     let coupling = &setup.layers.coupling;
-    let path = 2.0 * coupling.thickness - (receivers - source).abs();
-    x / speed + path * slowness(coupling.sound_speed, speed)
+    let path = 2.0 * coupling.thickness - (place.x3 - setup.probe.source.x3).abs();
+    place.x / speed + path * slowness(coupling.sound_speed, speed)
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the marrow's outer face.
-pub(super) fn lower_echo(setup: &Setup, x: f64, speed: f64) -> f64 {
+pub(super) fn lower_echo(setup: &Setup, place: Place, speed: f64) -> f64 {
     let marrow = &setup.layers.marrow;
     let across = 2.0 * marrow.thickness * slowness(marrow.sound_speed, speed);
-    earliest_arrival(setup, x, speed) + across
+    earliest_arrival(setup, place, speed) + across
 }

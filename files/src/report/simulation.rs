@@ -12,6 +12,10 @@ use super::{DocumentContent, Solver};
 pub struct Simulation {
     /// Velocity of the first arriving signal, m/s; null where none was picked.
     pub velocity: Option<f64>,
+    /// Velocities from the first source and from the second, m/s, of a bidirectional probe, of which
+    /// `velocity` is the harmonic mean; null where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub directions: Option<[f64; 2]>,
     /// Why there is no velocity; null where there is one.
     pub failure: Option<FailureKind>,
     /// The reason in words; null where there is a velocity.

@@ -86,7 +86,13 @@ mod tests {
     use super::*;
 
     fn arrival(velocity: f64, times: [f64; 3]) -> Result<Arrival, Failure> {
-        Ok(Arrival { velocity, times: times.to_vec(), estimated_error: 0.0, passes: None })
+        Ok(Arrival {
+            velocity,
+            directions: None,
+            times: times.to_vec(),
+            estimated_error: 0.0,
+            passes: None,
+        })
     }
 
     fn failure(kind: FailureKind) -> Result<Arrival, Failure> {

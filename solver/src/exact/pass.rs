@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use osteon_common::case::Setup;
+use osteon_common::probe::Place;
 use osteon_common::sampling::{self, RUN, WaveSampling, velocity_taper};
 
 use crate::Failure;
@@ -114,6 +115,7 @@ impl Estimated {
         let Self { pick, sampled: last, .. } = self;
         Arrival {
             velocity: pick.velocity,
+            directions: None,
             times: pick.times,
             estimated_error,
             passes: Some(PassSummary { count, pairs_computed, last }),
@@ -183,8 +185,8 @@ impl Exact {
         if !workspace.spectra.is_finite() {
             return Err(pressure_not_finite());
         }
-        let Self { setup, distances, isa, .. } = self;
-        isa.run(Observe { setup, distances, bin, band, speed, workspace });
+        let Self { setup, places, isa, .. } = self;
+        isa.run(Observe { setup, places, bin, band, speed, workspace });
         Ok(())
     }
 
@@ -227,8 +229,8 @@ impl Exact {
         pick: &Pick,
         workspace: &ExactWorkspace,
     ) -> f64 {
-        let Self { setup, distances, isa, .. } = self;
-        let delays = isa.run(Listen { setup, distances, bin, band, times: &pick.times, workspace });
+        let Self { setup, places, isa, .. } = self;
+        let delays = isa.run(Listen { setup, places, bin, band, times: &pick.times, workspace });
         let mean = picking::mean(&pick.times);
         let spread = pick.times.iter().fold(0.0, |sum, t| (t - mean).mul_add(t - mean, sum));
         let (mut changes, mut worst) = ([0.0; BEFORE], 0.0);
@@ -269,7 +271,7 @@ fn at_most_one(error: f64) -> f64 {
 /// Kernel that lists the extrema of the pressure at every receiver.
 struct Observe<'a> {
     setup: &'a Setup,
-    distances: &'a [f64],
+    places: &'a [Place],
     bin: &'a BinTables,
     band: &'a Band,
     /// Upper bound of every wave's speed, m/s.
@@ -284,15 +286,15 @@ impl Kernel for Observe<'_> {
     fn run<V: Vector>(self) {
         let ExactWorkspace { spectra, windows, slopes, tapered, .. } = self.workspace;
         let Tables { sampling, runs, .. } = &self.bin.tables;
-        windows.resize_with(self.distances.len(), Window::default);
-        for (r, (window, &x)) in windows.iter_mut().zip(self.distances).enumerate() {
+        windows.resize_with(self.places.len(), Window::default);
+        for (r, (window, &place)) in windows.iter_mut().zip(self.places).enumerate() {
             tapered.clear();
             for (run, &weights) in spectra.receiver(r).iter().zip(&self.band.taper) {
                 tapered.push(ComplexLanes { re: run.re * weights, im: run.im * weights });
             }
             let signal = Signal { sampling, runs, spectrum: tapered };
-            let from = sampling::earliest_arrival(self.setup, x, self.speed);
-            let to = sampling::direct_arrival(self.setup, x);
+            let from = sampling::earliest_arrival(self.setup, place, self.speed);
+            let to = sampling::direct_arrival(self.setup, place);
             let last = signal.extrema::<V>(&self.bin.grid, from, to, slopes, &mut window.extrema);
             window.last = last.abs();
             window.drop_noise();
@@ -329,7 +331,7 @@ impl Kernel for Repick<'_> {
 /// is there delays the picked extrema.
 struct Listen<'a> {
     setup: &'a Setup,
-    distances: &'a [f64],
+    places: &'a [Place],
     bin: &'a BinTables,
     band: &'a Band,
     times: &'a [f64],
@@ -344,10 +346,10 @@ impl Kernel for Listen<'_> {
         let Tables { sampling, runs, .. } = &self.bin.tables;
         let step = 1.0 / (BEFORE as f64 * self.setup.probe.center_frequency);
         let mut delays = Vec::with_capacity(self.times.len());
-        for (r, (&time, &x)) in self.times.iter().zip(self.distances).enumerate() {
+        for (r, (&time, &place)) in self.times.iter().zip(self.places).enumerate() {
             let spectrum = &self.workspace.spectra.receiver(r)[..self.band.taper.len()];
             let signal = Signal { sampling, runs, spectrum };
-            let earliest = sampling::earliest_arrival(self.setup, x, sampling.speed);
+            let earliest = sampling::earliest_arrival(self.setup, place, sampling.speed);
             // The last time is that of the pick.
             let mut times = Lanes([time; LANES]);
             for (i, t) in times.0[..BEFORE].iter_mut().enumerate() {

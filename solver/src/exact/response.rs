@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::complex::Complex;
 use crate::exact::plate::Plate;
 use crate::exact::tables::{Block, Line, Tables};
+use crate::exact::tilted::SumTilted;
 use crate::isa::{Isa, Kernel};
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::medium::Medium;
@@ -21,6 +22,8 @@ pub(crate) struct Spectra {
     runs: usize,
     /// Scratch memory of [`respond`].
     responses: Vec<ComplexLanes>,
+    /// Scratch memory of the sum for tilted probes.
+    sums: Vec<ComplexLanes>,
 }
 
 impl Spectra {
@@ -63,7 +66,13 @@ impl Spectra {
 
     /// Sums the responses of line `i` at every receiver.
     pub(crate) fn sum(&mut self, isa: Isa, tables: &Tables, i: usize, responses: &[ComplexLanes]) {
-        if !responses.is_empty() {
+        if responses.is_empty() {
+            return;
+        }
+        if tables.is_tilted() {
+            let Self { rows, runs, sums, .. } = self;
+            isa.run(SumTilted { tables, line: i, responses, rows, runs: *runs, sums });
+        } else {
             isa.run(SumOverWavenumbers { tables, line: i, responses, spectra: self });
         }
     }

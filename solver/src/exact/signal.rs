@@ -4,7 +4,7 @@
 //! p(t) = 2 e^{αt}/T Re Σ c_n e^{iω_n t}, and so is its slope.
 
 use osteon_common::case::Setup;
-use osteon_common::sampling::{FrequencyRun, WaveSampling, direct_arrival, distances};
+use osteon_common::sampling::{FrequencyRun, WaveSampling, direct_arrival};
 
 use crate::complex::Complex;
 use crate::exact::tables::Tables;
@@ -101,7 +101,8 @@ impl TimeGrid {
     }
 
     fn blocks(setup: &Setup) -> usize {
-        let last = distances(setup).map(|x| direct_arrival(setup, x)).fold(0.0, f64::max);
+        let places = setup.probe.places();
+        let last = places.map(|place| direct_arrival(setup, place)).fold(0.0, f64::max);
         ((last / Self::step(setup)) as usize / LANES + 2).next_multiple_of(GROUP)
     }
 

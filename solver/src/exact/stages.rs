@@ -5,13 +5,15 @@
 //! more. There, admittances and sums alternate, frequency by frequency; here all admittances come
 //! first. Each stage may be repeated.
 
+use std::sync::Arc;
+
 use osteon_common::case::{Bone, Setup};
 use osteon_common::sampling::{self, Grade, SPEED_BINS};
 
 use crate::exact::Exact;
 use crate::exact::pass::{Band, ExactWorkspace};
 use crate::exact::response::respond;
-use crate::exact::table_cache::TablesRef;
+use crate::exact::table_cache::{TableMemory, TablesRef};
 use crate::isa::Isa;
 use crate::lanes::ComplexLanes;
 use crate::medium::Medium;
@@ -58,7 +60,7 @@ impl Stages {
     /// Creates the stages for cases of `setup`, which has passed validation, on one instruction
     /// set.
     pub fn new(setup: &Setup, isa: Isa) -> Self {
-        Self { exact: Exact::new(setup, isa) }
+        Self { exact: Exact::new(setup, isa, &Arc::new(TableMemory::default())) }
     }
 
     /// Tensor: computes the common part of the admittances of one bone.

@@ -144,13 +144,13 @@ mod tests {
         let setup = Setup::default();
         let ensemble = Ensemble::new(&OPTIMUM, 7).unwrap();
         let bones: Vec<_> = (0..6).map(|index| ensemble.bone(index).unwrap()).collect();
-        let keeps = Exact::new(&setup, Isa::fastest());
+        let keeps = Exact::new(&setup, Isa::fastest(), &Arc::new(TableMemory::default()));
         let expected = bits(&keeps, &bones);
         let held = |exact: &Exact| exact.without_faces.quick.memory.0.load(Ordering::Relaxed);
         assert!(held(&keeps) < TABLE_BYTES_MAX, "{}", held(&keeps));
         // No bin is kept; some bins and lines are.
         for free in [0, held(&keeps) / 4, held(&keeps) / 2] {
-            let keeps_few = Exact::new(&setup, Isa::fastest());
+            let keeps_few = Exact::new(&setup, Isa::fastest(), &Arc::new(TableMemory::default()));
             assert!(keeps_few.without_faces.quick.memory.reserve(TABLE_BYTES_MAX - free));
             assert_eq!(bits(&keeps_few, &bones), expected, "{free} bytes free");
             assert!(held(&keeps_few) <= TABLE_BYTES_MAX, "{}", held(&keeps_few));

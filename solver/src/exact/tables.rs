@@ -6,11 +6,12 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use osteon_common::case::Setup;
-use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling, distances};
+use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling};
 
 use crate::complex::Complex;
 use crate::exact::attenuation::LosslessFrequencies;
 use crate::exact::table_cache::TableMemory;
+use crate::exact::tilted::{HeightFactor, HeightFactors};
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::pulse::Pulse;
 
@@ -18,6 +19,7 @@ use crate::pulse::Pulse;
 #[derive(Debug)]
 pub(crate) struct Tables {
     setup: Setup,
+    heights: Heights,
     pub(crate) sampling: WaveSampling,
     /// Positions of the lines on the frequency axis, eight lines per run.
     pub(crate) runs: Vec<FrequencyRun>,
@@ -31,6 +33,17 @@ pub(crate) struct Tables {
     blocks: usize,
     /// Memory in which lines are kept; without it they are recomputed whenever they are needed.
     memory: Option<Arc<TableMemory>>,
+}
+
+/// Heights of source and receivers above the bone, m.
+#[derive(Debug, Clone, Copy)]
+struct Heights {
+    source: f64,
+    lowest: f64,
+    /// Height of a receiver above the next lower one; 0 if all have one height.
+    step: f64,
+    /// Whether receivers are the lower, the larger their number.
+    falling: bool,
 }
 
 /// One complex frequency.
@@ -58,6 +71,8 @@ pub(crate) struct KeptLine {
     blocks: Vec<Block>,
     /// exp(-2 g h1) of the blocks if echoes of the coupling's outer face matter, otherwise empty.
     echoes: Vec<ComplexLanes>,
+    /// Of the blocks if the probe is tilted, otherwise empty.
+    height_factors: Vec<HeightFactors>,
 }
 
 /// Eight neighbouring wavenumbers of one frequency.
@@ -104,7 +119,7 @@ impl Tables {
             .map(|(&n, pulse)| Line::new(setup, &sampling, n, pulse, taper))
             .collect();
         let blocks = lines.iter().map(|line| line.blocks).max().unwrap_or(0);
-        let positions: Vec<f64> = distances(setup).collect();
+        let positions: Vec<f64> = setup.probe.places().map(|place| place.x).collect();
         let wavenumbers: Vec<Lanes> = (0..blocks)
             .map(|b| {
                 let first = b * LANES;
@@ -117,6 +132,7 @@ impl Tables {
             .collect();
         Self {
             setup: *setup,
+            heights: Heights::of(setup),
             sampling,
             runs,
             lines,
@@ -131,8 +147,8 @@ impl Tables {
     /// Returns the contents of a line, empty if they are not kept.
     pub(crate) fn kept<'a>(&self, line: &'a Line) -> &'a KeptLine {
         line.kept.get_or_init(|| match &self.memory {
-            Some(memory) if memory.reserve(line.bytes(&self.sampling)) => {
-                line.contents(&self.setup, &self.sampling)
+            Some(memory) if memory.reserve(line.bytes(&self.sampling, self.is_tilted())) => {
+                line.contents(&self.setup, &self.heights, &self.sampling)
             }
             _ => KeptLine::default(),
         })
@@ -150,8 +166,39 @@ impl Tables {
         if let Some(block) = kept.blocks.get(b) {
             return (block, kept.echoes.get(b).unwrap_or(&ComplexLanes::ZERO));
         }
-        let (block, echo) = scratch.insert(line.block(&self.setup, &self.sampling, b));
+        let (block, echo) =
+            scratch.insert(line.block(&self.setup, &self.heights, &self.sampling, b));
         (block, echo)
+    }
+
+    /// Returns the factors of block `b` of a line that lead from one receiver of a tilted probe to the
+    /// next higher one, from its contents or computed into `scratch`.
+    #[inline(always)]
+    pub(crate) fn height_factors<'a>(
+        &self,
+        line: &Line,
+        kept: &'a KeptLine,
+        b: usize,
+        scratch: &'a mut Option<HeightFactors>,
+    ) -> &'a HeightFactors {
+        match kept.height_factors.get(b) {
+            Some(factors) => factors,
+            None => {
+                scratch.insert(line.height_factors(&self.setup, &self.heights, &self.sampling, b))
+            }
+        }
+    }
+
+    /// Returns whether the receivers are at different heights.
+    pub(crate) fn is_tilted(&self) -> bool {
+        self.heights.step != 0.0
+    }
+
+    /// Returns the receivers from the lowest to the highest.
+    #[inline(always)]
+    pub(crate) fn upwards(&self) -> impl Iterator<Item = usize> {
+        let (receivers, falling) = (self.receivers, self.heights.falling);
+        (0..receivers).map(move |i| if falling { receivers - 1 - i } else { i })
     }
 
     /// Returns the wavenumbers of block `b`, rad/m, which are the same at every frequency.
@@ -194,6 +241,19 @@ impl Tables {
     }
 }
 
+impl Heights {
+    fn of(setup: &Setup) -> Self {
+        let probe = &setup.probe;
+        let heights: Vec<f64> = probe.places().map(|place| place.x3).collect();
+        Self {
+            source: probe.source.x3,
+            lowest: probe.lowest_receiver(),
+            step: probe.receivers.pitch * libm::sin(probe.tilt).abs(),
+            falling: heights.first() > heights.last(),
+        }
+    }
+}
+
 impl Line {
     fn new(
         setup: &Setup,
@@ -214,18 +274,22 @@ impl Line {
     }
 
     /// Returns the memory of the line's contents, bytes.
-    fn bytes(&self, sampling: &WaveSampling) -> u64 {
+    fn bytes(&self, sampling: &WaveSampling, is_tilted: bool) -> u64 {
         let echo = if sampling.upper_echoes { size_of::<ComplexLanes>() } else { 0 };
-        (self.blocks * (size_of::<Block>() + echo)) as u64
+        let factors = if is_tilted { size_of::<HeightFactors>() } else { 0 };
+        (self.blocks * (size_of::<Block>() + echo + factors)) as u64
     }
 
     /// Computes all blocks.
-    fn contents(&self, setup: &Setup, sampling: &WaveSampling) -> KeptLine {
+    fn contents(&self, setup: &Setup, heights: &Heights, sampling: &WaveSampling) -> KeptLine {
         let mut kept = KeptLine::default();
         kept.blocks.reserve_exact(self.blocks);
         for b in 0..self.blocks {
-            let (block, echo) = self.block(setup, sampling, b);
+            let (block, echo) = self.block(setup, heights, sampling, b);
             kept.blocks.push(block);
+            if heights.step != 0.0 {
+                kept.height_factors.push(self.height_factors(setup, heights, sampling, b));
+            }
             if sampling.upper_echoes {
                 kept.echoes.push(echo);
             }
@@ -235,13 +299,19 @@ impl Line {
 
     /// Computes one block, and exp(-2 g h1) if echoes of the coupling's outer face matter,
     /// otherwise 0.
-    fn block(&self, setup: &Setup, sampling: &WaveSampling, b: usize) -> (Block, ComplexLanes) {
+    fn block(
+        &self,
+        setup: &Setup,
+        heights: &Heights,
+        sampling: &WaveSampling,
+        b: usize,
+    ) -> (Block, ComplexLanes) {
         let zero = ComplexLanes::ZERO;
         let (mut block, mut echo) = (Block { g: zero, load: zero, weight: zero }, zero);
         for lane in 0..LANES {
             let m = b * LANES + lane;
             let k = m as f64 * sampling.wavenumber_step;
-            let point = spectral_point(setup, sampling, self, k);
+            let point = spectral_point(setup, heights, sampling, self, k);
             // The trapezoidal rule from k = 0 on, for (1/π) ∫ … cos(kx) dk.
             let end = if m == 0 { 0.5 } else { 1.0 };
             let measure = end * sampling.wavenumber_step / PI;
@@ -252,6 +322,29 @@ impl Line {
             set(&mut echo, lane, point.echo);
         }
         (block, echo)
+    }
+
+    /// Computes the factors of one block that lead from one receiver to the next higher one.
+    fn height_factors(
+        &self,
+        setup: &Setup,
+        heights: &Heights,
+        sampling: &WaveSampling,
+        b: usize,
+    ) -> HeightFactors {
+        let coupling = &setup.layers.coupling;
+        let below_face = sampling.upper_echoes.then_some(coupling.thickness - heights.lowest);
+        let [mut from_below, mut from_above, mut image] = [ComplexLanes::ZERO; 3];
+        for lane in 0..LANES {
+            let k = (b * LANES + lane) as f64 * sampling.wavenumber_step;
+            let g = vertical_wavenumber(k, self.lossless.coupling, coupling.sound_speed);
+            let HeightFactor([below, above, ratio]) =
+                HeightFactor::new(g, heights.step, below_face);
+            set(&mut from_below, lane, below);
+            set(&mut from_above, lane, above);
+            set(&mut image, lane, ratio);
+        }
+        HeightFactors { from_below, from_above, image }
     }
 }
 
@@ -272,19 +365,27 @@ struct SpectralPoint {
 /// e2 = exp(-g (x3 + x3S)), ea = exp(-2g (h1 - x3)), eb = exp(-2g (h1 - x3S)), E2 = exp(-2g h1)
 /// ```
 ///
-/// and ρ1/(2g) e2 R if no reflection of the outer face can arrive in a window.
-fn spectral_point(setup: &Setup, sampling: &WaveSampling, line: &Line, k: f64) -> SpectralPoint {
+/// and ρ1/(2g) e2 R if no reflection of the outer face can arrive in a window. With a tilted probe x3 is
+/// the height of the lowest receiver, and 1 - ea is left to the sum over wavenumbers.
+fn spectral_point(
+    setup: &Setup,
+    heights: &Heights,
+    sampling: &WaveSampling,
+    line: &Line,
+    k: f64,
+) -> SpectralPoint {
     let coupling = &setup.layers.coupling;
-    let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
+    let Heights { source, lowest, step, .. } = *heights;
     let one = Complex::new(1.0, 0.0);
     let g = vertical_wavenumber(k, line.lossless.coupling, coupling.sound_speed);
     let damp = |length: f64| (-g.scale(length)).exp();
-    let mut factor = damp(source + receivers).scale(0.5 * coupling.density) / g;
+    let mut factor = damp(source + lowest).scale(0.5 * coupling.density) / g;
     let mut echo = Complex::default();
     if sampling.upper_echoes {
-        factor = factor
-            * (one - damp(2.0 * (coupling.thickness - receivers)))
-            * (one - damp(2.0 * (coupling.thickness - source)));
+        if step == 0.0 {
+            factor = factor * (one - damp(2.0 * (coupling.thickness - lowest)));
+        }
+        factor = factor * (one - damp(2.0 * (coupling.thickness - source)));
         echo = damp(2.0 * coupling.thickness);
     }
     let load = marrow_load(setup, line.s, &line.lossless, k, sampling.lower_echoes);

@@ -2,6 +2,7 @@
 
 use osteon_common::case::Bone;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
+use osteon_common::probe::Place;
 use osteon_common::sampling::{self, WaveSampling, trace_taper};
 use thiserror::Error;
 
@@ -138,10 +139,12 @@ impl Solver {
         spectra.fill(self.isa(), &tables, &medium, &mut plate, 0..tables.lines.len());
         let times: Vec<f64> =
             (0..=(samples + 1e-9) as usize).map(|j| j as f64 * time_step).collect();
-        let pressures: Vec<Vec<f64>> = (0..tables.receivers())
-            .map(|r| {
+        let places = self.setup().probe.places();
+        let pressures: Vec<Vec<f64>> = places
+            .enumerate()
+            .map(|(r, place)| {
                 let mut spectrum = spectra.receiver(r).to_vec();
-                self.add_fluid_waves(r, &tables, &mut spectrum);
+                self.add_fluid_waves(place, &tables, &mut spectrum);
                 for (run, weights) in spectrum.iter_mut().zip(&taper) {
                     run.re = run.re * *weights;
                     run.im = run.im * *weights;
@@ -157,15 +160,14 @@ impl Solver {
         Ok(Traces { times, pressures })
     }
 
-    /// Adds the direct wave and its image in the coupling's outer face at receiver `r`.
-    fn add_fluid_waves(&self, r: usize, tables: &Tables, spectrum: &mut [ComplexLanes]) {
+    /// Adds the direct wave and its image in the coupling's outer face at a receiver's place.
+    fn add_fluid_waves(&self, place: Place, tables: &Tables, spectrum: &mut [ComplexLanes]) {
         let setup = self.setup();
         let coupling = &setup.layers.coupling;
-        let (source, receivers) = (setup.probe.source, setup.probe.receivers);
-        let x = receivers.x1(r as u32) - source.x1;
-        let travel = |height: f64| libm::hypot(x, height) / coupling.sound_speed;
-        let direct = travel(receivers.x3 - source.x3);
-        let image = travel(2.0 * coupling.thickness - receivers.x3 - source.x3);
+        let source = setup.probe.source.x3;
+        let travel = |height: f64| libm::hypot(place.x, height) / coupling.sound_speed;
+        let direct = travel(place.x3 - source);
+        let image = travel(2.0 * coupling.thickness - place.x3 - source);
         for (i, line) in tables.lines.iter().enumerate() {
             let s = line.lossless.coupling;
             let wave = direct::pressure(coupling.density, direct, s)

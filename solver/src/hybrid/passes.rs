@@ -113,6 +113,7 @@ impl Passes<'_> {
             }
         }
         last.map(|PassResult { pick, dispersion, .. }| Arrival {
+            directions: None,
             velocity: pick.velocity,
             times: pick.times,
             // Passes that do not resolve the waves can agree by accident.

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::FailureKind;
-use osteon_common::sampling::{distances, earliest_arrival, smooth_step};
+use osteon_common::probe::Place;
+use osteon_common::sampling::{earliest_arrival, nearest_and_farthest, smooth_step};
 
 use super::mesh::Mesh;
 use super::scope::Scope;
@@ -120,11 +121,12 @@ impl Plan {
             )));
         }
         let heights = setup.probe.source.x3 + setup.probe.receivers.x3;
-        let farthest = distances(setup).fold(0.0, f64::max);
+        let (_, farthest) = nearest_and_farthest(setup);
         let end = scope.end();
         // The nearest repeated source must reach the farthest receiver only after the end.
+        let above = Place { x: 0.0, x3: setup.probe.receivers.x3 };
         let length =
-            farthest + scope.speed * (end - earliest_arrival(setup, 0.0, scope.speed)) + heights;
+            farthest + scope.speed * (end - earliest_arrival(setup, above, scope.speed)) + heights;
         let sound_speed = setup.layers.coupling.sound_speed;
         let propagating = 2.0 * PI * BAND * setup.probe.center_frequency / sound_speed;
         let evanescent = EVANESCENCE / heights;

@@ -1,7 +1,8 @@
 //! The windows of time that are evaluated at the receivers.
 
 use osteon_common::case::Setup;
-use osteon_common::sampling::{self, direct_arrival, earliest_arrival};
+use osteon_common::probe::Place;
+use osteon_common::sampling::{direct_arrival, earliest_arrival};
 
 /// The windows of all receivers, for a bone whose waves along x1 have at most this speed.
 #[derive(Debug, Clone)]
@@ -26,12 +27,12 @@ pub(super) struct Span {
 impl Scope {
     /// Returns the windows up to the direct wave.
     pub(super) fn until_direct_wave(setup: &Setup, speed: f64) -> Self {
-        let span = |x| Span {
-            distance: x,
-            from: earliest_arrival(setup, x, speed),
-            to: direct_arrival(setup, x),
+        let span = |place: Place| Span {
+            distance: place.x,
+            from: earliest_arrival(setup, place, speed),
+            to: direct_arrival(setup, place),
         };
-        Self { speed, windows: sampling::distances(setup).map(span).collect() }
+        Self { speed, windows: setup.probe.places().map(span).collect() }
     }
 
     /// Returns windows that end at most `after` (s) after each of `times` (s), one per receiver.

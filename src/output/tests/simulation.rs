@@ -5,6 +5,7 @@ use super::*;
 fn arrival() -> Arrival {
     Arrival {
         velocity: 3908.75,
+        directions: None,
         times: vec![2.9e-6, 3.104_7e-6, 3.309_3e-6],
         estimated_error: 2e-5,
         passes: None,

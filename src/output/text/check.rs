@@ -11,11 +11,12 @@ pub(super) fn table(check: &Check) -> String {
     let mut rows = vec![header.map(str::to_owned)];
     rows.extend(check.solutions().map(row));
     let verdict = if check.passed() {
-        let agreed = match check.hybrid {
-            Some(_) => "the methods agree",
-            None => "the solutions agree; the method hybrid computes no attenuation",
-        };
-        agreed.to_owned()
+        match check.exact.setup.only_exact() {
+            None => "the methods agree".to_owned(),
+            Some((_, name)) => {
+                format!("the solutions agree; the method hybrid computes no {name}")
+            }
+        }
     } else if !check.same_picks() {
         "THE PICKS DIFFER".to_owned()
     } else {
