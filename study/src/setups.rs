@@ -53,6 +53,8 @@ struct Ranges {
     /// Quality factor of the bone, and that of the fluids. Half of the cases have them; no case has
     /// them if this is `None`.
     quality_factors: Option<[(f64, f64); 2]>,
+    /// Largest tilt of half of the cases, rad.
+    tilt: f64,
 }
 
 /// The ranges of the study.
@@ -64,6 +66,7 @@ const RANGES: Ranges = Ranges {
     fluid_thickness: (1e-3, 30e-3),
     fluid_density: (500.0, 6000.0),
     quality_factors: Some([(8.0, 100.0), (50.0, 2000.0)]),
+    tilt: 0.07,
 };
 
 /// One case: a bone with its own setup, and the quantities from which it was drawn.
@@ -205,9 +208,14 @@ impl MeasuredSetup {
         let receivers = &probe.receivers;
         let bone = &layers.bone_attenuation;
         let quality = bone.quality_factor.map_or(String::new(), |found| format!(" (Q {found:.0})"));
+        let tilt = if probe.tilt == 0.0 {
+            String::new()
+        } else {
+            format!(", tilted by {:.1}°", probe.tilt.to_degrees())
+        };
         format!(
             "case {}: {} against {} at refinement {REFERENCE}{}; plate {:.2} mm{quality}, {:.2} MHz, coupling {}, \
-             marrow {}, source {:.2} mm, {} receivers at {:.2} mm from {:.1} every {:.2} mm, {:?}",
+             marrow {}, source {:.2} mm, {} receivers at {:.2} mm from {:.1} every {:.2} mm{tilt}, {:?}",
             self.index,
             outcome(&self.found),
             outcome(&self.reference),
@@ -241,6 +249,9 @@ fn drawn(seed: u64, index: u64, ranges: &Ranges) -> Result<Option<Drawn>, PointE
         let (mut setup, point) = (setup(&mut generator, ranges), point(&mut generator));
         if let Some(factors) = ranges.quality_factors.filter(|_| generator.uniform() < 0.5) {
             attenuate(&mut setup.layers, &mut generator, factors);
+        }
+        if ranges.tilt > 0.0 && generator.uniform() < 0.5 {
+            setup.probe.tilt = generator.between(-ranges.tilt, ranges.tilt);
         }
         if !is_suitable(&setup) {
             continue;
@@ -342,6 +353,7 @@ mod tests {
         fluid_thickness: (2e-3, 30e-3),
         fluid_density: (500.0, 2200.0),
         quality_factors: None,
+        tilt: 0.0,
     };
 
     fn outcome(index: u64, difference: Difference) -> MeasuredSetup {
