@@ -49,6 +49,16 @@ fn and_when_refined_with_echoes() {
 }
 
 #[test]
+fn and_with_a_tilted_probe_in_both_directions() {
+    let change = |setup: &mut Setup| {
+        setup.layers.coupling.thickness = 4e-3;
+        setup.probe.tilt = 0.02;
+        setup.probe.bidirectional = true;
+    };
+    check(change, 0.25, 3);
+}
+
+#[test]
 fn every_instruction_set_gives_the_same_traces() {
     let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.25]);
     let bone = Ensemble::new(&point, 4).unwrap().bone(0).unwrap();
