@@ -19,15 +19,6 @@ const PRIOR_POINTS: u64 = 4096;
 /// Smallest number of effective draws of a result that counts as converged.
 const EFFECTIVE_MIN: f64 = 400.0;
 
-/// The draws that a result summarises.
-struct FinalDraws {
-    /// The problem, its likelihood with the sampling errors of the model's moments.
-    problem: PosteriorProblem,
-    population: Population,
-    /// Effective number of independent draws.
-    effective: f64,
-}
-
 impl PosteriorSearch {
     /// Returns the posterior, once all evaluations are made. `errors` are the relative standard
     /// errors of the model's moments due to sampling.
@@ -36,10 +27,15 @@ impl PosteriorSearch {
         specification: &JobSpecification,
         errors: [f64; 2],
     ) -> Option<Posterior> {
-        let drawn = self.final_draws(errors)?;
-        let reason = self.reason(&drawn, errors);
-        let FinalDraws { problem, population, effective } = drawn;
-        let [of_mean, of_variation] = in_units_of_the_data(&problem, errors);
+        let problem = self.problem.as_ref().filter(|_| self.pending.is_empty())?;
+        let problem = &problem.with_model_errors(errors);
+        let population = self.final_population(problem);
+        if population.members.is_empty() {
+            return None;
+        }
+        let effective = population.effective() * self.check.efficiency();
+        let reason = self.reason(errors);
+        let [of_mean, of_variation] = in_units_of_the_data(problem, errors);
         let prior = problem.prior_points(PRIOR_POINTS);
         let of = |quantity: &dyn Fn(&Point) -> f64| summary(&population, &prior, quantity);
         let free: Vec<Parameter> = problem.priors.iter().map(|prior| prior.parameter).collect();
@@ -69,34 +65,18 @@ impl PosteriorSearch {
             entries: entries(&population, &prior),
             predictive_p_value: None,
             outlier_share: problem.likelihood.outlier_share(at).map(|share| share.mean),
-            draws: draws(&population, &problem, count),
+            draws: draws(&population, problem, count),
         })
     }
 
     /// Returns how a job ends that asks for nothing but the posterior; `errors` as in `result`.
     pub(crate) fn ending(&self, errors: Option<[f64; 2]>) -> SearchOutcome {
-        let outcome = self.outcome();
-        let Some(errors) = errors.filter(|_| outcome == SearchOutcome::Converged) else {
-            return outcome;
-        };
-        // Draws with large errors of the model take long, and are not needed to say so.
-        let noisy = self.problem.as_ref().and_then(|problem| too_noisy(problem, errors));
-        let reason = noisy.or_else(|| self.reason(&self.final_draws(errors)?, errors));
-        reason.map_or(outcome, SearchOutcome::Doubtful)
-    }
-
-    /// Returns the draws that the result summarises, once all evaluations are made; `None` if there
-    /// are none.
-    fn final_draws(&self, errors: [f64; 2]) -> Option<FinalDraws> {
-        let problem = self.problem.as_ref().filter(|_| self.pending.is_empty())?;
-        let problem = problem.with_model_errors(errors);
-        let points = POINTS[usize::from(!problem.is_of_few())];
-        let population = problem.population(&self.surrogate, points, self.populations);
-        if population.members.is_empty() {
-            return None;
+        match (self.outcome(), errors) {
+            (SearchOutcome::Converged, Some(errors)) => {
+                self.reason(errors).map_or(SearchOutcome::Converged, SearchOutcome::Doubtful)
+            }
+            (outcome, _) => outcome,
         }
-        let effective = population.effective() * self.check.efficiency();
-        Some(FinalDraws { problem, population, effective })
     }
 
     /// Returns mean or coefficient of variation of the interpolated model.
@@ -105,18 +85,26 @@ impl PosteriorSearch {
     }
 
     /// Returns why the result is not accurate; `None` if it is.
-    fn reason(&self, drawn: &FinalDraws, errors: [f64; 2]) -> Option<String> {
+    fn reason(&self, errors: [f64; 2]) -> Option<String> {
         if let SearchOutcome::Doubtful(reason) = self.outcome() {
             return Some(reason);
         }
-        let FinalDraws { problem, effective, .. } = drawn;
-        let few = (*effective < EFFECTIVE_MIN).then(|| {
+        let problem = self.problem.as_ref()?;
+        // Without the errors of the model, which make draws count more, and take long if large.
+        let effective = self.final_population(problem).effective() * self.check.efficiency();
+        let few = (effective < EFFECTIVE_MIN).then(|| {
             format!(
                 "the draws count as {effective:.0} independent ones only, {EFFECTIVE_MIN} are \
                  needed: few points within the bounds match the data; widen the bounds or the priors"
             )
         });
         too_noisy(problem, errors).or(few)
+    }
+
+    /// Returns the draws of the final interpolation.
+    fn final_population(&self, problem: &PosteriorProblem) -> Population {
+        let points = POINTS[usize::from(!problem.is_of_few())];
+        problem.population(&self.surrogate, points, self.populations)
     }
 }
 
