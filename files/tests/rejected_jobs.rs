@@ -275,20 +275,6 @@ fn run() {
 }
 
 #[test]
-fn a_posterior_needs_two_realizations() {
-    let sampling = "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4";
-    for (section, method) in [("[posterior]\n", "simplex"), ("", "posterior")] {
-        let text =
-            edited(sampling, "realizations = 1").replace("\"simplex\"", &format!("\"{method}\""));
-        assert_eq!(
-            refusal(&format!("{text}\n{section}"), JobKind::Identification),
-            "1 error\n  line 54: monte_carlo.realizations: is 1; a posterior needs the law of \
-             velocities that differ, so at least 2"
-        );
-    }
-}
-
-#[test]
 fn the_draws_and_evaluations_of_many_groups_are_bounded() {
     let groups: String = (0..1000).map(|k| format!("g{k} = [3900.0, 4000.0]\n")).collect();
     let of = |method: &str, section: &str| {

@@ -14,7 +14,6 @@ pub struct Simulation {
     pub velocity: Option<f64>,
     /// Velocities from the first source and from the second, m/s, of a bidirectional probe, of which
     /// `velocity` is the harmonic mean; null where there is none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub directions: Option<[f64; 2]>,
     /// Why there is no velocity; null where there is one.
     pub failure: Option<FailureKind>,

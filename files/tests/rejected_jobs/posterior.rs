@@ -2,7 +2,7 @@
 
 use osteon_common::job::JobKind;
 
-use super::check;
+use super::{check, edited, refusal};
 
 /// A section with one prior.
 fn prior(prior: &str) -> String {
@@ -49,4 +49,18 @@ fn posterior() {
         "method = \"posterior\"\npriors = { dispersion = { value = 0.1, weight = 1.0 } }",
     ));
     check("rejected_posterior", JobKind::Identification, &rows);
+}
+
+#[test]
+fn a_posterior_needs_two_realizations() {
+    let sampling = "realizations = 500\nseed = 7\nsampling = \"sobol\"\nscrambles = 4";
+    for (section, method) in [("[posterior]\n", "simplex"), ("", "posterior")] {
+        let text =
+            edited(sampling, "realizations = 1").replace("\"simplex\"", &format!("\"{method}\""));
+        assert_eq!(
+            refusal(&format!("{text}\n{section}"), JobKind::Identification),
+            "1 error\n  line 54: monte_carlo.realizations: is 1; a posterior needs the law of \
+             velocities that differ, so at least 2"
+        );
+    }
 }

@@ -102,8 +102,7 @@ fn setup() -> impl Strategy<Value = Setup> {
         let mut setup = Setup::default();
         setup.solver.refinement = refinement;
         setup.layers.bone_attenuation.quality_factor = quality;
-        setup.probe.tilt = 0.02 * (1.0 - refinement);
-        setup.probe.bidirectional = quality.is_some();
+        (setup.probe.tilt, setup.probe.bidirectional) = (-0.02 * refinement, quality.is_some());
         setup
     });
     let hybrid = (1e-4..1e-3, 2_u32..=12, proptest::option::of(1e-9..1e-7)).prop_map(

@@ -109,3 +109,15 @@ fn a_check_shows_every_solution_and_whether_it_passed() {
     assert_eq!(check[2]["estimated_error"], 2e-5);
     assert_eq!(check[2]["same_pick"], true);
 }
+
+#[test]
+fn both_directions_of_a_probe_are_shown() {
+    let arrival = Ok(Arrival { directions: Some([3750.5, 4080.5]), ..arrival() });
+    let text = unwrapped(&simulation(OutputFormat::Text, &arrival, None));
+    let expected =
+        "harmonic mean of 3750.500 m/s from the first source and 4080.500 m/s from the second";
+    assert!(text.contains(expected), "{text}");
+    let json = simulation(OutputFormat::Json, &arrival, None);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["directions"], serde_json::json!([3750.5, 4080.5]));
+}
