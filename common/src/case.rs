@@ -33,9 +33,7 @@ impl Setup {
             (Key { name: "solver", meaning: "settings of the wave solver" }, &mut self.solver),
         ]
     }
-}
 
-impl Setup {
     /// Returns path and name of what only the exact method computes, if the setup has any of it.
     pub fn only_exact(&self) -> Option<(&'static str, &'static str)> {
         let attenuated = self.layers.attenuated().map(|field| (field, "attenuation"));

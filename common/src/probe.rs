@@ -101,8 +101,8 @@ impl Probe {
         self.places().map(|place| place.x3).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the probe as its second source sees it: the bone is turned round, which changes no
-    /// velocity, so that the receivers' distances are the same.
+    /// Returns the probe as its second source sees it, in the mirrored bone, whose velocities are the
+    /// same: the receivers have the same distances, in the opposite order.
     pub fn from_other_side(&self) -> Self {
         let (first, last) = (self.receivers.x1(0), self.receivers.x1(self.receivers.count - 1));
         let apart = (first - self.source.x1).abs() + (last - self.source.x1).abs();

@@ -102,8 +102,8 @@ fn tilted(setup: &Setup, violations: &mut Violations) {
         return;
     }
     let top = setup.layers.coupling.thickness;
-    let sides = [*probe, probe.from_other_side()];
-    for probe in &sides[..if probe.bidirectional { 2 } else { 1 }] {
+    let other_side = probe.bidirectional.then(|| probe.from_other_side());
+    for probe in [*probe].into_iter().chain(other_side) {
         let heights = || probe.places().map(|place| place.x3).chain([probe.source.x3]);
         let lowest = heights().fold(f64::INFINITY, f64::min);
         let highest = heights().fold(f64::NEG_INFINITY, f64::max);

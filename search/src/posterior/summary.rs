@@ -90,15 +90,19 @@ impl PosteriorSearch {
             return Some(reason);
         }
         let problem = self.problem.as_ref()?;
+        too_noisy(problem, errors).or_else(|| self.too_few_draws(problem))
+    }
+
+    /// Returns that too few draws count; `None` if they are enough.
+    fn too_few_draws(&self, problem: &PosteriorProblem) -> Option<String> {
         // Without the errors of the model, which make draws count more, and take long if large.
         let effective = self.final_population(problem).effective() * self.check.efficiency();
-        let few = (effective < EFFECTIVE_MIN).then(|| {
+        (effective < EFFECTIVE_MIN).then(|| {
             format!(
                 "the draws count as {effective:.0} independent ones only, {EFFECTIVE_MIN} are \
                  needed: few points within the bounds match the data; widen the bounds or the priors"
             )
-        });
-        too_noisy(problem, errors).or(few)
+        })
     }
 
     /// Returns the draws of the final interpolation.

@@ -310,9 +310,12 @@ impl DatasetSearch {
             first: self.first.as_ref(),
             evaluations: self.evaluations,
             posterior: self.posterior.as_ref().map(|posterior| {
-                // The search has a status of its own, which the posterior does not change.
-                let is_all = !specification.is_searched();
-                if is_all { posterior.ending(errors) } else { posterior.outcome() }
+                if specification.is_searched() {
+                    // The search has a status of its own, which the posterior does not change.
+                    posterior.outcome()
+                } else {
+                    posterior.ending(errors)
+                }
             }),
         };
         // Always set before the end.

@@ -11,7 +11,7 @@ use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling};
 use crate::complex::Complex;
 use crate::exact::attenuation::LosslessFrequencies;
 use crate::exact::table_cache::TableMemory;
-use crate::exact::tilted::{HeightFactor, HeightFactors};
+use crate::exact::tilted::{HeightFactors, height_factors};
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::pulse::Pulse;
 
@@ -71,7 +71,7 @@ pub(crate) struct KeptLine {
     blocks: Vec<Block>,
     /// exp(-2 g h1) of the blocks if echoes of the coupling's outer face matter, otherwise empty.
     echoes: Vec<ComplexLanes>,
-    /// Of the blocks if the probe is tilted, otherwise empty.
+    /// The height factors of every block if the probe is tilted, otherwise empty.
     height_factors: Vec<HeightFactors>,
 }
 
@@ -191,7 +191,7 @@ impl Tables {
 
     /// Returns whether the receivers are at different heights.
     pub(crate) fn is_tilted(&self) -> bool {
-        self.heights.step != 0.0
+        self.heights.are_different()
     }
 
     /// Returns the receivers from the lowest to the highest.
@@ -252,6 +252,11 @@ impl Heights {
             falling: heights.first() > heights.last(),
         }
     }
+
+    /// Returns whether the receivers are at different heights.
+    fn are_different(&self) -> bool {
+        self.step != 0.0
+    }
 }
 
 impl Line {
@@ -287,7 +292,7 @@ impl Line {
         for b in 0..self.blocks {
             let (block, echo) = self.block(setup, heights, sampling, b);
             kept.blocks.push(block);
-            if heights.step != 0.0 {
+            if heights.are_different() {
                 kept.height_factors.push(self.height_factors(setup, heights, sampling, b));
             }
             if sampling.upper_echoes {
@@ -338,8 +343,7 @@ impl Line {
         for lane in 0..LANES {
             let k = (b * LANES + lane) as f64 * sampling.wavenumber_step;
             let g = vertical_wavenumber(k, self.lossless.coupling, coupling.sound_speed);
-            let HeightFactor([below, above, ratio]) =
-                HeightFactor::new(g, heights.step, below_face);
+            let [below, above, ratio] = height_factors(g, heights.step, below_face);
             set(&mut from_below, lane, below);
             set(&mut from_above, lane, above);
             set(&mut image, lane, ratio);
@@ -375,14 +379,14 @@ fn spectral_point(
     k: f64,
 ) -> SpectralPoint {
     let coupling = &setup.layers.coupling;
-    let Heights { source, lowest, step, .. } = *heights;
+    let Heights { source, lowest, .. } = *heights;
     let one = Complex::new(1.0, 0.0);
     let g = vertical_wavenumber(k, line.lossless.coupling, coupling.sound_speed);
     let damp = |length: f64| (-g.scale(length)).exp();
     let mut factor = damp(source + lowest).scale(0.5 * coupling.density) / g;
     let mut echo = Complex::default();
     if sampling.upper_echoes {
-        if step == 0.0 {
+        if !heights.are_different() {
             factor = factor * (one - damp(2.0 * (coupling.thickness - lowest)));
         }
         factor = factor * (one - damp(2.0 * (coupling.thickness - source)));

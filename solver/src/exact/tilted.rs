@@ -23,26 +23,18 @@ pub(crate) struct HeightFactors {
     pub(crate) image: ComplexLanes,
 }
 
-/// Factors of one wavenumber: of the part from below, of the part from above, and their ratio at the
-/// lowest receiver.
-pub(crate) struct HeightFactor(pub(crate) [Complex; 3]);
-
-impl HeightFactor {
-    /// Returns the factors for the vertical wavenumber `g` (rad/m) and a difference of heights (m).
-    /// `below_face` is the distance of the lowest receiver from the coupling's outer face, m; `None`
-    /// if no reflection of it can arrive in a window.
-    pub(crate) fn new(g: Complex, difference: f64, below_face: Option<f64>) -> Self {
-        let image = below_face.map_or(Complex::default(), |depth| (-g.scale(2.0 * depth)).exp());
-        let growth = g.scale(difference).exp();
-        // All receivers are below the face, so that a part that grows beyond all numbers is
-        // negligible at each of them.
-        let growth = if growth.re.is_finite() && growth.im.is_finite() {
-            growth
-        } else {
-            Complex::default()
-        };
-        Self([(-g.scale(difference)).exp(), growth, image])
-    }
+/// Returns the factors of one wavenumber, those of the part from below and of the part from above and
+/// the ratio at the lowest receiver, for the vertical wavenumber `g` (rad/m) and a difference of heights
+/// (m). `below_face` is the distance of the lowest receiver from the coupling's outer face, m; `None` if
+/// no reflection of it can arrive in a window.
+pub(crate) fn height_factors(g: Complex, difference: f64, below_face: Option<f64>) -> [Complex; 3] {
+    let image = below_face.map_or(Complex::default(), |depth| (-g.scale(2.0 * depth)).exp());
+    let growth = g.scale(difference).exp();
+    let is_finite = growth.re.is_finite() && growth.im.is_finite();
+    // All receivers are below the face, so that a part that grows beyond all numbers is negligible
+    // at each of them.
+    let growth = if is_finite { growth } else { Complex::default() };
+    [(-g.scale(difference)).exp(), growth, image]
 }
 
 /// Kernel that sums the responses of one line at every receiver of a tilted probe.
