@@ -14,10 +14,15 @@ const WIDER: f64 = 1.1;
 /// Share of wrong velocities from which it is stated.
 const NOTABLE: f64 = 0.005;
 
+/// Posteriors of the moments differ from the intervals of the data: they count the noise of the model
+/// and the prior.
+const INTRODUCTION: &str = "The data fix the mean velocity and the coefficient of variation. \
+    Posterior of both moments of the model, whose own noise counts, and of what is behind them:";
+
 /// Returns the statement on what the data fix, the table of quantities, and the effort behind it.
 pub(super) fn text(found: &PosteriorReport) -> String {
     if found.converged {
-        introduced(&fixed(found), found)
+        introduced(INTRODUCTION, found)
     } else {
         introduced("Posterior, which did not converge:", found)
     }
@@ -45,21 +50,11 @@ fn introduced(introduction: &str, found: &PosteriorReport) -> String {
     text
 }
 
-/// Says between which limits the data fix the moments of the velocities.
-fn fixed(found: &PosteriorReport) -> String {
-    let mean = limits(&found.mean, 1.0, " m/s");
-    let variation = limits(&found.coefficient_of_variation, 1.0, "");
-    let (mean, variation) = (glued(&mean), glued(&variation));
-    let level = glued("95 %");
-    format!(
-        "The data fix the mean velocity ({mean}) and the coefficient of variation ({variation}); \
-         {level}. Posterior of the model behind them:"
-    )
-}
-
-/// Returns a heading, and a row for each quantity: those that the data know best first.
+/// Returns a heading, and a row for each quantity: those of which the data say most first.
 fn rows(found: &PosteriorReport) -> Vec<[String; 4]> {
     let mut rows = vec![["", "mean ± sd", "95 % interval", "from data"].map(str::to_owned)];
+    rows.push(row("mean velocity", &found.mean, 1.0, " m/s"));
+    rows.push(row("coefficient of variation", &found.coefficient_of_variation, 1.0, ""));
     rows.push(row("√(c1111/ρ)", &found.bulk_velocity, 1.0, " m/s"));
     let of = |parameter: Parameter, quantity: &QuantityPosterior| {
         let (scale, unit) = scale(parameter);
