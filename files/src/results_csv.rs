@@ -193,6 +193,9 @@ fn reason(group: &GroupResult) -> &str {
             "the model does not match the data within their noise: no intervals"
         }
         _ if group.status == Status::MaxEvaluations => "the evaluations are used up",
+        (_, Some(_)) if group.data.intervals.is_none() && group.conclusions.posterior.is_none() => {
+            "fewer than five velocities or subjects: no intervals"
+        }
         (_, Some(found))
             if !found.undetermined.is_empty() && group.conclusions.posterior.is_none() =>
         {

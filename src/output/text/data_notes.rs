@@ -10,6 +10,10 @@ const LISTED_MAX: usize = 5;
 /// Step of rounding, in standard deviations of the velocities, from which it is stated.
 const COARSE: f64 = 0.1;
 
+/// Why few velocities have no intervals.
+pub(super) const TOO_FEW: &str =
+    "they need at least five velocities, or five subjects where subjects are named";
+
 /// Returns all remarks, each on lines of its own.
 pub(super) fn text(data: &Data) -> String {
     let remarks = [outliers(data), rounding(data), kolmogorov(data)];

@@ -6,6 +6,7 @@ use osteon_common::results::Status;
 use osteon_files::report::{Identification, Moment, PosteriorReport};
 use osteon_search::search_box::{SearchBox, Side};
 
+use super::data_notes;
 use super::identified;
 use super::layout::{glued, wrapped};
 use super::number::{DIGITS, digits, significant};
@@ -153,7 +154,8 @@ pub(super) fn uniqueness(
         return if shown_below {
             String::new()
         } else {
-            format!("\n{}", wrapped(&format!("{speed} at this point.")))
+            let reason = no_intervals(found, specification).unwrap_or_default();
+            format!("\n{}", wrapped(&format!("{speed} at this point.{reason}")))
         };
     }
     let known = match specification.objective {
@@ -192,4 +194,21 @@ pub(super) fn uniqueness(
         text.push_str(&format!("\n{speed}{dispersion}"));
     }
     format!("\n{}", wrapped(&text))
+}
+
+/// Says why a model that matches, with parameters that the data could determine, has no intervals:
+/// the noise of the data is not known.
+fn no_intervals(found: &Identification, specification: &JobSpecification) -> Option<String> {
+    let data = specification.data.as_ref()?;
+    if found.data.as_ref()?.intervals().is_some() {
+        return None;
+    }
+    let needed = match data.measurements {
+        Measurements::Moments { count: None, .. } => {
+            "the noise of the data is not known; `data.count`, the number of velocities behind the \
+             moments, gives it"
+        }
+        _ => data_notes::TOO_FEW,
+    };
+    Some(format!(" No intervals: {needed}."))
 }

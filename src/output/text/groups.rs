@@ -198,6 +198,9 @@ fn note(group: &Group) -> Option<String> {
         (None, _) if unmatched && group.posterior.is_none() => {
             Some("the model does not match the data within their noise: no intervals".to_owned())
         }
+        (None, _) if group.data.intervals().is_none() && group.posterior.is_none() => {
+            Some(format!("no intervals: {}", data_notes::TOO_FEW))
+        }
         _ => None,
     }
 }

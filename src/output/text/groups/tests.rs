@@ -140,3 +140,12 @@ fn what_the_data_cannot_say_is_told_once() {
     assert!(!with(&["longitudinal_young_modulus", "dispersion"]).contains("cannot determine"));
     assert!(!with(&["longitudinal_young_modulus"]).contains("cannot determine"));
 }
+
+#[test]
+fn a_group_of_too_few_velocities_says_why_it_has_no_intervals() {
+    let mut few = known("P01", 2e10);
+    few["data"]["interval"] = json!(null);
+    let text = table(&[few, known("P02", 2e10)]).replace("\n  ", " ");
+    assert!(text.contains("P01: no intervals: they need at least five velocities"), "{text}");
+    assert!(!text.contains("P02: "), "{text}");
+}
