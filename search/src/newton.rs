@@ -14,7 +14,8 @@
 //! from the current point, so that steps add no detours. Once a whole step has ended at a cost
 //! below [`NEAR`], they are measured from there, and one descent is used: the remaining distance is
 //! then too small to matter, and corrections that also slid along the matching points would be
-//! longer than the errors that they correct. The start itself is evaluated first.
+//! longer than the errors that they correct. The start itself is evaluated first, unless
+//! [`Newton::from_solution`] leaves it out.
 //!
 //! # Safeguards
 //!
@@ -124,6 +125,8 @@ pub struct Newton {
     /// The step of lowest cost so far, if one was feasible.
     base: Option<Evaluated>,
     pending: Vec<f64>,
+    /// The start, as long as it may have to be evaluated after the pending solution.
+    left_out: Option<Vec<f64>>,
     purpose: PointPurpose,
     /// Whether the pending step reaches the model's solution.
     full_step: bool,
@@ -151,6 +154,7 @@ impl Newton {
             weights: None,
             base: None,
             pending: start.clone(),
+            left_out: None,
             centre: start,
             near: false,
             purpose: PointPurpose::Step,
@@ -173,6 +177,20 @@ impl Newton {
     pub fn weighted_by(mut self, weights: MomentWeights) -> Self {
         self.model.weigh(weights.normalized());
         self.weights = Some(weights);
+        self
+    }
+
+    /// Begins with the closed form's solution nearest to the start, instead of with the start. The
+    /// solution is nearer to the data, and a random point of the box may have bones that take a hundred
+    /// times as long to compute, or fail. If the solution is infeasible, the start is evaluated after
+    /// all.
+    #[must_use]
+    pub fn from_solution(mut self) -> Self {
+        if self.stop.is_none() {
+            let solution = self.model_solution();
+            self.left_out = Some(std::mem::replace(&mut self.pending, solution));
+            self.full_step = true;
+        }
         self
     }
 
@@ -245,7 +263,13 @@ impl Newton {
     fn finish_step(&mut self, trial: Option<Evaluated>) {
         let length = norm(&subtract(&self.pending, self.base_point()));
         let lowest = self.base.as_ref().map(|base| base.cost);
+        let left_out = self.left_out.take();
         let Some(trial) = trial else {
+            if let Some(start) = left_out {
+                self.pending = start;
+                self.full_step = false;
+                return;
+            }
             // The start is not a step and has no length.
             self.radius = if length > 0.0 { 0.5 * length } else { self.radius };
             self.next_step(false);

@@ -94,7 +94,15 @@ fn search(
     settings: Settings,
     moments: impl Fn(&Point) -> Option<Moments>,
 ) -> Found {
-    let mut newton = Newton::new(space, data, settings);
+    finish(Newton::new(space, data, settings), space, data, moments)
+}
+
+fn finish(
+    mut newton: Newton,
+    space: SearchBox,
+    data: Moments,
+    moments: impl Fn(&Point) -> Option<Moments>,
+) -> Found {
     let (mut cost, mut at) = (f64::INFINITY, Vec::new());
     loop {
         let pending = match newton.ask() {
@@ -171,6 +179,36 @@ fn a_bone_is_found_in_a_few_evaluations() {
     assert!(evaluations[count / 2] <= 6, "{evaluations:?}");
     assert!(evaluations[count - 1 - count / 50] <= 8, "{evaluations:?}");
     assert!(evaluations[count - 1] <= 30, "{evaluations:?}");
+}
+
+/// Without the evaluations of the starts, the same points are found.
+#[test]
+fn a_search_from_the_solution_of_the_closed_form_takes_fewer_evaluations() {
+    let data = bone(&OPTIMUM);
+    let (mut from_start, mut from_solution) = (0, 0);
+    for index in 0..100 {
+        let germs = Germs::draw(18, index);
+        let space = all_free(&std::array::from_fn(|axis| germs.values()[axis]));
+        if !admissible(&space.point(&space.start())) {
+            continue;
+        }
+        let usual = search(space, data, SETTINGS, |point| Some(bone(point)));
+        let newton = || Newton::new(space, data, SETTINGS).from_solution();
+        let found = finish(newton(), space, data, |point| Some(bone(point)));
+        assert_eq!(found.stop, StopReason::CostReached, "{index}: {found:?}");
+        let (off, distance) = off_nearest(space, &found.at, &bone);
+        assert!(off <= 0.08 * distance + 1e-6, "{index}: off by {off} of {distance}: {found:?}");
+        from_start += usual.evaluations;
+        from_solution += found.evaluations;
+        // Where the solution is infeasible, the start is evaluated after all.
+        let first = space.point(match newton().ask() {
+            Proposal::Evaluate(at) => at,
+            Proposal::Stopped(stop) => panic!("{index}: {stop:?}"),
+        });
+        let found = finish(newton(), space, data, |point| (*point != first).then(|| bone(point)));
+        assert_eq!(found.stop, StopReason::CostReached, "{index}: {found:?}");
+    }
+    assert!(from_solution * 10 < from_start * 9, "{from_solution} against {from_start}");
 }
 
 properties! {

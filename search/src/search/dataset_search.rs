@@ -68,6 +68,7 @@ impl DatasetSearch {
         let weighted = given.filter(|_| specification.objective == Objective::ChiSquare);
         let weights = weighted.and_then(|given| MomentWeights::of_data(given, set));
         let measured = measured(specification, set);
+        let method = MethodState::new(specification, data, measured, weights, space);
         let mut search = Self {
             // A job has at most a thousand sets.
             set: u32::try_from(set).unwrap_or(u32::MAX),
@@ -75,7 +76,7 @@ impl DatasetSearch {
             weights,
             start: 0,
             space,
-            method: MethodState::new(specification, data, measured, weights, space),
+            method: method_of_start(specification, 0, method),
             evaluations: 0,
             first: None,
             best: None,
@@ -272,8 +273,9 @@ impl DatasetSearch {
         if u64::from(self.start) < specification.search.starts {
             self.space = space_of_start(specification, self.start);
             let measured = measured(specification, self.set as usize);
-            self.method =
+            let method =
                 MethodState::new(specification, self.data, measured, self.weights, self.space);
+            self.method = method_of_start(specification, self.start, method);
             return;
         }
         if let Some(best) = self.best.as_ref().filter(|_| specification.search.sensitivities) {
@@ -334,6 +336,17 @@ fn unsearched(why: NoVariation) -> GroupEnding {
 /// Returns the velocities of a set of data, if they are known.
 fn measured(specification: &JobSpecification, set: usize) -> Option<&[f64]> {
     specification.data.as_ref().and_then(|data| data.velocities(set))
+}
+
+/// Lets the search from a random point begin near the data; that from the parameters' own start begins
+/// there.
+fn method_of_start(
+    specification: &JobSpecification,
+    start: u32,
+    method: MethodState,
+) -> MethodState {
+    let is_random = specification.search.first_start + u64::from(start) > 0;
+    if is_random { method.near_the_data() } else { method }
 }
 
 /// Returns the box for one of a job's searches. Its start is that of the parameters, or a random

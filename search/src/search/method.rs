@@ -57,6 +57,15 @@ impl MethodState {
         }
     }
 
+    /// Begins near what matches the data, if the method can tell where that is, instead of at the
+    /// start.
+    pub(super) fn near_the_data(self) -> Self {
+        match self {
+            Self::Newton(newton) => Self::Newton(Box::new(newton.from_solution())),
+            method => method,
+        }
+    }
+
     /// Returns the next point, or the reason why there is none.
     pub(super) fn ask(&self) -> Proposal<'_> {
         match self {
