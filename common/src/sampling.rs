@@ -53,7 +53,7 @@ const THIN_PLATE_POWER: f64 = 1.6;
 /// Largest widening of the band for a thin plate.
 const THIN_PLATE_MAX: f64 = 3.0;
 /// Maximum number of bands in which a bone is computed with one sampling.
-pub const BANDS: usize = 3;
+pub const BANDS: usize = 4;
 /// Ratio of the highest frequency of traces to the centre frequency: a trace is accurate to 1e-3 of
 /// its largest value.
 const TRACE_BAND: f64 = 12.0;
@@ -64,11 +64,16 @@ const TAPER_START: f64 = 0.5;
 /// α T: a wave that wraps round is weakened by exp(-this). Truncation errors grow as e^(αt), so a
 /// larger value needs more wavenumbers.
 const WRAP_DAMPING: f64 = 12.0;
+/// The same of the plain grade.
+const PLAIN_DAMPING: f64 = 15.0;
 /// The same of the thorough grade, at refinement 1, where a weak arrival may precede large waves that
 /// last long.
 const THOROUGH_DAMPING: f64 = 16.0;
 /// Largest difference of α t, where an extremum is picked, from α T.
 const GROWTH_MARGIN: f64 = 1.5;
+/// Latest time of an extremum that a quick sampling is made for, after the earliest possible arrival,
+/// in periods of the centre frequency.
+pub const QUICK_LATEST: f64 = 1.4;
 /// Shortest period, in periods of the centre frequency.
 const SHORTEST_PERIOD: f64 = 6.0;
 /// Period, in periods of the centre frequency, from which the thinning of frequencies removes those
@@ -76,6 +81,8 @@ const SHORTEST_PERIOD: f64 = 6.0;
 const THINNED_PERIOD: f64 = 8.0;
 /// Difference, from α T, of the exponent at which the sum over wavenumbers ends.
 const EVANESCENCE: f64 = 6.5;
+/// The same of the plain grade.
+const PLAIN_EVANESCENCE: f64 = 9.0;
 /// The same of the thorough grade, at refinement 1: what is cut off there grows as e^(αt), and may be
 /// large compared with an attenuated arrival.
 const THOROUGH_EVANESCENCE: f64 = 12.0;
@@ -126,6 +133,8 @@ pub enum OuterFaces {
 /// Sampling of one setup for waves up to one speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WaveSampling {
+    /// How fine it is.
+    pub grade: Grade,
     /// No wave along x1 is faster, m/s.
     pub speed: f64,
     /// T, s.
@@ -235,7 +244,7 @@ impl WaveSampling {
         // earliest possible arrival; latest time for which the wave of a repeated source must be
         // kept out.
         let (reflected_length, latest_pick, latest_source) = match grade {
-            Grade::Quick | Grade::Plain => (1.0, 1.4, 1.4),
+            Grade::Quick | Grade::Plain => (1.0, QUICK_LATEST, QUICK_LATEST),
             Grade::Thorough | Grade::Full => (4.0, 2.5, f64::INFINITY),
         };
         let damping = wrap_damping(setup, grade);
@@ -291,7 +300,8 @@ impl WaveSampling {
             Grade::Full => f64::INFINITY,
         };
         let evanescence = match grade {
-            Grade::Quick | Grade::Plain => EVANESCENCE,
+            Grade::Quick => EVANESCENCE,
+            Grade::Plain => PLAIN_EVANESCENCE,
             // Finer sampling is also less truncated, slowly.
             Grade::Thorough | Grade::Full => {
                 THOROUGH_EVANESCENCE + 2.0 * libm::log(refinement.max(1.0))
@@ -301,6 +311,7 @@ impl WaveSampling {
         let through_fluid = earliest_arrival(setup, Place { x: 0.0, x3: lowest }, speed);
         let length = farthest + speed * (last - through_fluid).max(0.0) + heights;
         Self {
+            grade,
             speed,
             period,
             frequency_step: 2.0 * PI / period,
@@ -407,11 +418,15 @@ impl WaveSampling {
 /// Returns the highest frequencies of the passes, as multiples of the centre frequency.
 fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> [f64; BANDS] {
     let wide = (10.5 * thinness).min(24.0);
+    // At refinement 1 thinning leaves too few frequencies farther up for the echoes in a thin plate.
+    let widest = if refinement > 1.0 { 4.0 * wide } else { (4.0 * wide).min(48.0) };
     match grade {
-        Grade::Quick | Grade::Plain => [5.25 * thinness, wide, 2.0 * wide].map(|f| f * refinement),
-        Grade::Thorough => [wide, 2.0 * wide, 4.0 * wide].map(|f| f * refinement.sqrt()),
+        // Too much is thinned out of a quick sampling for a still wider band to help.
+        Grade::Quick => [5.25 * thinness, wide, wide, wide].map(|f| f * refinement),
+        Grade::Plain => [5.25 * thinness, wide, 2.0 * wide, widest].map(|f| f * refinement),
+        Grade::Thorough => [wide, 2.0 * wide, widest, widest].map(|f| f * refinement.sqrt()),
         // Without thinning, a band of twice the width costs four times as much.
-        Grade::Full => [wide, 2.0 * wide, 2.0 * wide].map(|f| f * refinement.sqrt()),
+        Grade::Full => [wide, 2.0 * wide, 2.0 * wide, 2.0 * wide].map(|f| f * refinement.sqrt()),
     }
 }
 
@@ -458,7 +473,8 @@ fn first_bin_edge(setup: &Setup) -> f64 {
 /// Returns α T.
 fn wrap_damping(setup: &Setup, grade: Grade) -> f64 {
     match grade {
-        Grade::Quick | Grade::Plain => WRAP_DAMPING,
+        Grade::Quick => WRAP_DAMPING,
+        Grade::Plain => PLAIN_DAMPING,
         Grade::Thorough | Grade::Full => {
             THOROUGH_DAMPING + 2.0 * libm::log(setup.solver.refinement.max(1.0))
         }

@@ -1,9 +1,9 @@
 //! Exact layers in the (frequency, wavenumber) domain.
 //!
-//! A bone is computed in one or several passes. The first pass is quick and sufficient for most
-//! bones. As long as its estimated error is large, the band is widened, at most twice. If the first
-//! arrival is small compared to later waves, the same is done without thinning. If the pick is
-//! unreliable (late, weak, off the line of the others, or missing), the bone is computed again with
+//! A bone is computed in one or several passes (`passes.rs`). The first pass is quick and sufficient for
+//! most bones. As long as its estimated error is large, the band is widened, and then the sampling is
+//! made finer, as it is at once where the first arrival is small compared with later waves. If the pick
+//! is unreliable (late, weak, off the line of the others, or missing), the bone is computed again with
 //! a thorough sampling, whose band is widened if it finds nothing or its estimated error is large.
 //! If the estimated error is still large, the last passes are finer and leave nothing out.
 //! The results of two passes are blended with a weight from 0 (the first pass is reliable) to 1
@@ -16,6 +16,7 @@ pub(crate) mod attenuation;
 pub(crate) mod direct;
 pub(crate) mod growth;
 pub(crate) mod pass;
+mod passes;
 pub(crate) mod plate;
 #[cfg(feature = "measure")]
 pub(crate) mod quantities;
@@ -29,7 +30,6 @@ pub(crate) mod tables;
 pub(crate) mod tilted;
 pub(crate) mod traces;
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use osteon_common::case::{Bone, Setup};
@@ -37,9 +37,9 @@ use osteon_common::outcome::FailureKind;
 use osteon_common::probe::Place;
 use osteon_common::sampling::{self, Grade, OuterFaces};
 
-use crate::exact::pass::{Band, BinTables, Estimated, ExactWorkspace, slow_decay};
+use crate::exact::pass::{Estimated, ExactWorkspace, slow_decay};
+use crate::exact::passes::BonePasses;
 use crate::exact::plate::Plate;
-use crate::exact::response::Spectra;
 use crate::exact::table_cache::{PAIRS_MAX, TableCache, TableMemory, TablesRef};
 use crate::isa::{Isa, Kernel};
 use crate::medium::Medium;
@@ -47,24 +47,19 @@ use crate::picking::{self, Pick};
 use crate::solver::{Arrival, Failure, check_direct_wave, readable, speed_not_finite};
 use crate::vector::Vector;
 
-/// Stated errors due to the band, or to the sampling, at refinement 1, between which the weight of the
-/// pass with the next wider band, or of the next sampling, rises from 0 to 1.
-const LARGE_ERROR: (f64, f64) = (1.3e-4, 2e-4);
-/// The same for the whole error and the last two samplings.
-const VERY_LARGE_ERROR: (f64, f64) = (1.6e-4, 2.4e-4);
 /// Factor of the refinement in the last passes, at refinement 1 and below.
 const LAST_REFINEMENT: f64 = 4.0;
 /// Delays of a pick after the earliest possible arrival, in periods of the centre frequency,
-/// between which the weight of the next pass rises: a quick period has little room for a late
-/// packet.
-const LATE: (f64, f64) = (0.62, 0.72);
+/// between which the weight of the next pass rises: a quick sampling has room for packets up to
+/// [`sampling::QUICK_LATEST`].
+const LATE: (f64, f64) = (1.2, 1.3);
 /// Times from a pick to the direct wave, in periods, between which the weight of the next pass
 /// falls.
-const NEAR_DIRECT_WAVE: (f64, f64) = (1.1, 1.25);
+const NEAR_DIRECT_WAVE: (f64, f64) = (0.05, 0.1);
 /// Ratios to the threshold between which the weight of the next pass falls.
-const WEAK: (f64, f64) = (1.2, 1.6);
+const WEAK: (f64, f64) = (1.05, 1.1);
 /// Ratios of a skipped extremum to the threshold between which the weight of the next pass rises.
-const NEARLY_PICKED: (f64, f64) = (0.6, 0.8);
+const NEARLY_PICKED: (f64, f64) = (0.9, 0.95);
 /// Times from a pick to the earliest possible echo, in periods, between which the weight of the
 /// result without outer faces rises.
 const BEFORE_ECHO: (f64, f64) = (0.0, 0.1);
@@ -72,9 +67,6 @@ const BEFORE_ECHO: (f64, f64) = (0.0, 0.1);
 const FAINT: f64 = 10.0 * picking::FLOOR;
 /// Distances from the line, in periods, between which the weight of the next pass rises.
 const OFF_LINE: (f64, f64) = (0.02, 0.03);
-/// Ratios of a pick to the largest wave in its window between which the weight of the next pass
-/// falls: the errors of thinning and of leaving out slow waves reach some 1e-5 of that wave.
-const SMALL: (f64, f64) = (0.02, 0.03);
 /// Picks of two passes that differ by more than this, in periods, belong to different extrema.
 const SAME_EXTREMUM: f64 = 0.05;
 
@@ -120,16 +112,7 @@ impl Exact {
         let (medium, speed) = self.solid(bone)?;
         let bin = sampling::speed_bin(&self.setup, speed).ok_or_else(|| too_large(speed))?;
         let caches = &self.without_faces;
-        let mut passes = BonePasses {
-            exact: self,
-            caches,
-            medium: &medium,
-            speed,
-            bin,
-            workspace,
-            count: 0,
-            pairs: 0,
-        };
+        let mut passes = BonePasses::new(self, caches, &medium, speed, bin, workspace);
         let mut found = passes.in_bins();
         if self.needs_faces(&found, speed) {
             passes.caches = &self.with_faces;
@@ -280,17 +263,6 @@ impl Exact {
     }
 }
 
-/// Returns the weight of further passes: that of the error, or 1 where they decide whether there is an
-/// arrival.
-fn next_weight(found: &Result<Estimated, Failure>, of_error: impl Fn(&Estimated) -> f64) -> f64 {
-    match found {
-        Ok(found) => of_error(found),
-        Err(Failure { kind, .. }) => {
-            f64::from(matches!(kind, FailureKind::NoArrival | FailureKind::InconsistentArrival))
-        }
-    }
-}
-
 fn too_large(speed: f64) -> Failure {
     Failure {
         kind: FailureKind::NoConvergence,
@@ -319,132 +291,6 @@ impl GradeCaches {
             thorough: TableCache::new(setup, Grade::Thorough, faces, memory),
             full: TableCache::new(&refined, Grade::Full, faces, memory),
         }
-    }
-}
-
-/// State of the passes for one bone.
-struct BonePasses<'a> {
-    exact: &'a Exact,
-    caches: &'a GradeCaches,
-    medium: &'a Medium,
-    /// Upper bound of every wave's speed, m/s.
-    speed: f64,
-    /// Index of the speed bin.
-    bin: usize,
-    workspace: &'a mut ExactWorkspace,
-    /// Number of passes so far.
-    count: u32,
-    /// Number of (frequency, wavenumber) pairs computed so far.
-    pairs: u64,
-}
-
-impl BonePasses<'_> {
-    /// Computes as many passes as the bone needs, in its speed bin and, near the edge, in the next.
-    fn in_bins(&mut self) -> Result<Estimated, Failure> {
-        let found = self.run();
-        let next = sampling::next_bin_weight(&self.exact.setup, self.bin, self.speed);
-        if next == 0.0 {
-            return found;
-        }
-        self.bin += 1;
-        let other = self.run();
-        self.bin -= 1;
-        self.exact.merged_if_possible(found, other, next)
-    }
-
-    /// Computes as many passes as the bone needs in one speed bin.
-    fn run(&mut self) -> Result<Estimated, Failure> {
-        let Self { exact, caches, speed, .. } = *self;
-        let rough = |found: &Estimated| rise(exact.counted(found.sampling_error), LARGE_ERROR);
-        if sampling::first_grade(&exact.setup) == Grade::Thorough {
-            let found = self.thorough(&caches.thorough, LARGE_ERROR.1);
-            return self.completed(found, rough);
-        }
-        let small = |found: &Estimated| 1.0 - rise(found.pick.prominence, SMALL);
-        let mut found = self.quick(&caches.quick);
-        let weight = found.as_ref().map_or(0.0, |found| rough(found).max(small(found)));
-        if weight > 0.0 {
-            let plain = self.quick(&caches.plain);
-            found = exact.merged(found, plain, weight);
-        }
-        let large = |found: &Estimated| rise(exact.counted(found.error()), VERY_LARGE_ERROR);
-        let doubt = |found: &Estimated| large(found).max(exact.fallback_weight(found, speed));
-        let weight = found.as_ref().map_or(1.0, doubt);
-        if weight > 0.0 {
-            let thorough = self.thorough(&caches.thorough, VERY_LARGE_ERROR.1);
-            found = exact.merged(found, thorough, weight);
-        }
-        self.completed(found, large)
-    }
-
-    /// Makes the last passes if the weight of the error is not 0, or if there is no arrival yet.
-    fn completed(
-        &mut self,
-        found: Result<Estimated, Failure>,
-        of_error: impl Fn(&Estimated) -> f64,
-    ) -> Result<Estimated, Failure> {
-        let weight = next_weight(&found, of_error);
-        if weight == 0.0 {
-            return found;
-        }
-        let full = self.thorough(&self.caches.full, f64::INFINITY);
-        self.exact.merged_if_possible(found, full, weight)
-    }
-
-    /// Makes the passes of a quick grade.
-    fn quick(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
-        let bin = &*self.exact.bin_tables(cache, self.bin, self.speed)?;
-        self.exact.fill_plate(self.medium, &mut self.workspace.fast);
-        self.bands(bin, LARGE_ERROR.1, |workspace| (&mut workspace.fast, &mut workspace.spectra))
-    }
-
-    /// Makes the passes of a thorough grade; a sampling error of at least `limit` is left to the next
-    /// grade.
-    fn thorough(&mut self, cache: &TableCache, limit: f64) -> Result<Estimated, Failure> {
-        let bin = &*self.exact.bin_tables(cache, self.bin, self.speed)?;
-        self.exact.fill_plate(self.medium, &mut self.workspace.accurate);
-        self.bands(bin, limit, |workspace| (&mut workspace.accurate, &mut workspace.spectra))
-    }
-
-    /// Makes a pass in the first band of a bin, and in the wider ones as far as they are needed: a
-    /// sampling error of at least `limit` cannot be mended by the band. `parts` returns the plate to be
-    /// used, and the spectra.
-    fn bands<const TERMS: usize>(
-        &mut self,
-        bin: &BinTables,
-        limit: f64,
-        parts: fn(&mut ExactWorkspace) -> (&mut Plate<TERMS>, &mut Spectra),
-    ) -> Result<Estimated, Failure> {
-        let exact = self.exact;
-        self.workspace.spectra.clear(&bin.tables);
-        let fill = |passes: &mut Self, lines: Range<usize>| {
-            let (plate, spectra) = parts(passes.workspace);
-            passes.pairs += bin.tables.pairs(lines.clone());
-            spectra.fill(exact.isa, &bin.tables, passes.medium, plate, lines);
-        };
-        fill(self, 0..bin.first.lines);
-        let mut found = self.pass(bin, &bin.first);
-        let mut lines = bin.first.lines;
-        for band in &bin.wider {
-            let weight = next_weight(&found, |found| {
-                let is_vain = exact.counted(found.sampling_error) >= limit;
-                if is_vain { 0.0 } else { rise(exact.counted(found.band_error), LARGE_ERROR) }
-            });
-            if weight == 0.0 {
-                break;
-            }
-            fill(self, lines..band.lines);
-            lines = band.lines;
-            let wider = self.pass(bin, band).map(|wider| wider.after(&found));
-            found = exact.merged(found, wider, weight);
-        }
-        found
-    }
-
-    fn pass(&mut self, bin: &BinTables, band: &Band) -> Result<Estimated, Failure> {
-        self.count += 1;
-        self.exact.observe(self.speed, bin, band, self.workspace)?;
-        self.exact.picked(bin, band, self.workspace)
     }
 }
 

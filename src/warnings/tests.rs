@@ -49,13 +49,13 @@ fn a_mean_out_of_reach_is_told_with_the_bounds_to_widen() {
         (
             5500.0,
             FIXED,
-            "above what points within the bounds reach (3621 to 4383 m/s): the search will end at its \
+            "above what points within the bounds reach (3621 to 4382 m/s): the search will end at its \
              bounds; widen the upper bound of longitudinal_young_modulus",
         ),
         (
             3400.0,
             FIXED,
-            "below what points within the bounds reach (3621 to 4383 m/s): the search will end at its \
+            "below what points within the bounds reach (3621 to 4382 m/s): the search will end at its \
              bounds; widen the lower bound of longitudinal_young_modulus",
         ),
         (

@@ -13,7 +13,7 @@ use crate::draws::{OPTIMUM, solved};
 
 /// Realizations of the model: the comparison is exact for any number.
 const REALIZATIONS: u64 = 16;
-const COUNT: u64 = 300;
+const COUNT: u64 = 100;
 /// Nodes of each axis.
 const NODES: usize = 27;
 /// Steps between two nodes.
