@@ -16,8 +16,8 @@ const NOTABLE: f64 = 0.005;
 
 /// Posteriors of the moments differ from the intervals of the data: they count the noise of the model
 /// and the prior.
-const INTRODUCTION: &str = "The data fix the mean velocity and the coefficient of variation. \
-    Posterior of both moments of the model, whose own noise counts, and of what is behind them:";
+const INTRODUCTION: &str = "Posterior of the mean velocity and the coefficient of variation, which the \
+    data fix (the model's own noise counts), and of what is behind them:";
 
 /// Returns the statement on what the data fix, the table of quantities, and the effort behind it.
 pub(super) fn text(found: &PosteriorReport) -> String {

@@ -25,7 +25,7 @@ fn doubts_are_told() {
     assert!(vague.contains(warning), "{vague}");
     let unexplained = said(|found| found.converged = false);
     assert!(unexplained.contains("did not converge. Its intervals may be off."), "{unexplained}");
-    assert!(!unexplained.contains("The data fix"), "{unexplained}");
+    assert!(!unexplained.contains("which the data"), "{unexplained}");
     let share = "An estimated 1.2 % of the velocities are not from the model's law";
     assert!(said(|_| {}).contains(share));
     assert!(!said(|found| found.outlier_share = Some(0.0004)).contains("An estimated"));
