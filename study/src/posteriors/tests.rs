@@ -11,9 +11,10 @@ use osteon_solver::Solver;
 use super::*;
 use crate::draws::{OPTIMUM, solved};
 
-/// Realizations of the model: the comparison is exact for any number.
-const REALIZATIONS: u64 = 16;
-const COUNT: u64 = 100;
+/// Realizations of the model: the comparison is exact for any number, but the mean velocity of a few
+/// bones is rough by 1e-6 where passes are blended, and these are enough for that not to matter.
+const REALIZATIONS: u64 = 64;
+const COUNT: u64 = 300;
 /// Nodes of each axis.
 const NODES: usize = 27;
 /// Steps between two nodes.
