@@ -125,8 +125,8 @@ pub struct Newton {
     /// The step of lowest cost so far, if one was feasible.
     base: Option<Evaluated>,
     pending: Vec<f64>,
-    /// The start, as long as it may have to be evaluated after the pending solution.
-    left_out: Option<Vec<f64>>,
+    /// Whether the start was left out, and may have to be evaluated after the pending solution.
+    start_left_out: bool,
     purpose: PointPurpose,
     /// Whether the pending step reaches the model's solution.
     full_step: bool,
@@ -154,7 +154,7 @@ impl Newton {
             weights: None,
             base: None,
             pending: start.clone(),
-            left_out: None,
+            start_left_out: false,
             centre: start,
             near: false,
             purpose: PointPurpose::Step,
@@ -187,8 +187,8 @@ impl Newton {
     #[must_use]
     pub fn from_solution(mut self) -> Self {
         if self.stop.is_none() {
-            let solution = self.model_solution();
-            self.left_out = Some(std::mem::replace(&mut self.pending, solution));
+            self.pending = self.model_solution();
+            self.start_left_out = true;
             self.full_step = true;
         }
         self
@@ -263,10 +263,11 @@ impl Newton {
     fn finish_step(&mut self, trial: Option<Evaluated>) {
         let length = norm(&subtract(&self.pending, self.base_point()));
         let lowest = self.base.as_ref().map(|base| base.cost);
-        let left_out = self.left_out.take();
+        let start_left_out = std::mem::take(&mut self.start_left_out);
         let Some(trial) = trial else {
-            if let Some(start) = left_out {
-                self.pending = start;
+            if start_left_out {
+                // As long as no point was feasible, this is the start.
+                self.pending = self.base_point().to_vec();
                 self.full_step = false;
                 return;
             }
