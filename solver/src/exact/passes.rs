@@ -17,7 +17,7 @@ use crate::solver::Failure;
 /// Stated errors due to the band, or to the sampling, at refinement 1, between which the weight of the
 /// pass with the next wider band, or of the next sampling, rises from 0 to 1.
 const LARGE_ERROR: (f64, f64) = (1.4e-4, 1.9e-4);
-/// The same for the whole error and the last two samplings.
+/// The same of the errors due to the sampling, for the last two samplings.
 const VERY_LARGE_ERROR: (f64, f64) = (1.5e-4, 2.2e-4);
 /// Ratios of a pick to the largest wave in its window between which the weight of the next pass
 /// falls, for an array of [`USUAL_ARRAY`]: the errors of thinning and of leaving out slow
