@@ -8,7 +8,6 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use osteon_common::job::{JobKind, JobSpecification};
-use osteon_common::parameters::Parameter;
 use osteon_files::job_file;
 use osteon_search::{CompletedJob, IdentifyError, identify};
 use osteon_solver::{Solver, Workspace};
@@ -18,8 +17,10 @@ use rayon::prelude::*;
 pub(crate) fn run(
     specification: &JobSpecification,
 ) -> Result<CompletedJob, IdentifyError<Infallible>> {
-    let solver = Solver::new(&specification.setup);
+    let mut solver = Solver::new(&specification.setup);
     identify(specification, |realizations| {
+        // It differs from the job's if quantities of the setup are searched.
+        solver.change_setup(&realizations.point.setup(&specification.setup));
         let solve = |workspace: &mut Workspace, index| {
             solver.realization(&realizations.ensemble, index, workspace)
         };
@@ -35,8 +36,8 @@ fn main() -> anyhow::Result<()> {
     let CompletedJob { result, history } = run(&specification)?;
     println!("{} after {} evaluations", result.status.name(), history.len());
     if let Some(best) = &result.best {
-        for parameter in Parameter::ALL {
-            println!("{:<27} {:?}", parameter.name(), best.point.get(parameter));
+        for (parameter, value) in best.point.given() {
+            println!("{:<27} {value:?}", parameter.name());
         }
     }
     println!("{:<27} {}", "digest", result.digest);

@@ -29,7 +29,7 @@ pub(crate) fn drawn_posterior() -> Posterior {
         prior_standard_deviation: prior,
     };
     let draw = |modulus: f64, log_density: f64| PosteriorDraw {
-        point: Point([1598.8, modulus, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
+        point: Point::of_bone([1598.8, modulus, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
         log_density,
         mean: 3905.5,
         coefficient_of_variation: 0.0271,

@@ -6,10 +6,12 @@
 use osteon_common::attainable_moments::{self, AttainableMoments};
 use osteon_common::case::{Bone, Setup};
 use osteon_common::job::{JobKind, JobSpecification, Range};
-use osteon_common::parameters::{Parameter, Point};
+use osteon_common::parameters::{PARAMETERS, Parameter, Point};
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::Moments;
 use osteon_common::sampling::pair_count;
 use osteon_common::settings::SolverSettings;
+use osteon_common::setup_quantity::SetupQuantity;
 use osteon_common::warnings::Warning;
 use osteon_solver::{Failure, Solver, Workspace};
 
@@ -94,26 +96,24 @@ struct ClosedFormMoments {
 impl ClosedFormMoments {
     fn new(specification: &JobSpecification, setup: &Setup) -> Self {
         let ranges = &specification.parameters;
-        let solver = Solver::new(setup);
-        let mut workspace = Workspace::default();
+        let (mut solver, mut workspace) = (Solver::new(setup), Workspace::default());
         let mut velocity = |point: &Point| {
             let elasticity = point.constants().elasticity().ok()?;
             let bone = Bone { density: point.density(), elasticity };
+            solver.change_setup(&point.setup(setup));
             Some(solver.arrival(&bone, &mut workspace).map(|arrival| arrival.velocity))
         };
-        let mut corner = |point: Option<Point>| {
-            let point = point?;
-            Some((point, velocity(&point)?.ok()?))
-        };
-        let slowest = corner(Some(attainable_moments::lowest_bulk_velocity_point(ranges)));
-        let fastest = corner(attainable_moments::highest_bulk_velocity_point(ranges));
+        let slower = |one: (Point, f64), other: (Point, f64)| one.1 <= other.1;
+        let slowest = Some(attainable_moments::lowest_bulk_velocity_point(ranges));
+        let slowest = of_corners(slowest, ranges, &mut velocity, slower);
+        let fastest = attainable_moments::highest_bulk_velocity_point(ranges);
+        let fastest = of_corners(fastest, ranges, &mut velocity, |one, other| !slower(one, other));
         let start = velocity(&specification.start()).unwrap_or(Ok(f64::NAN));
-        Self {
-            slowest,
-            fastest,
-            start,
-            variation: AttainableMoments::from_ranges(ranges, setup).variation,
-        }
+        let of_elasticity =
+            AttainableMoments::from_ranges(ranges, setup, &RandomQuantities::default()).variation;
+        let of_setup = scatter_at_start(specification, setup);
+        let variation = [of_elasticity.0, of_elasticity.1].map(|part| part.hypot(of_setup));
+        Self { slowest, fastest, start, variation: variation.into() }
     }
 
     /// Returns which moments of data with this number of velocities are out of reach, each with the
@@ -182,6 +182,50 @@ impl ClosedFormMoments {
     }
 }
 
+/// Returns the velocity, m/s, of a point, or of those with the bounds of the setup's parameters in
+/// place of their starts: the one that `is_better` than all others, with its point.
+fn of_corners(
+    point: Option<Point>,
+    ranges: &[Range; PARAMETERS],
+    velocity: &mut impl FnMut(&Point) -> Option<Result<f64, Failure>>,
+    is_better: impl Fn((Point, f64), (Point, f64)) -> bool,
+) -> Option<(Point, f64)> {
+    let mut corners = vec![point?];
+    for parameter in Parameter::OF_SETUP {
+        if let Range::Free { lower, upper, .. } = ranges[parameter as usize] {
+            let at = |bound: f64, mut corner: Point| {
+                corner.0[parameter as usize] = bound;
+                corner
+            };
+            let ends = [lower, upper];
+            corners = corners.iter().flat_map(|&one| ends.map(|bound| at(bound, one))).collect();
+        }
+    }
+    let solved = corners.into_iter().map(|point| Some((point, velocity(&point)?.ok()?)));
+    let solved: Option<Vec<(Point, f64)>> = solved.collect();
+    solved?.into_iter().reduce(|best, one| if is_better(one, best) { one } else { best })
+}
+
+/// Returns the approximate coefficient of variation that the random quantities of the setup give the
+/// velocity of the start's mean model, from its values one standard deviation below and above their
+/// means.
+fn scatter_at_start(specification: &JobSpecification, setup: &Setup) -> f64 {
+    let (start, random) = (specification.start(), &specification.random);
+    let Ok(elasticity) = start.constants().elasticity() else { return 0.0 };
+    let bone = Bone { density: start.density(), elasticity };
+    let (setup, mut workspace) = (start.setup(setup), Workspace::default());
+    let of_quantity = |quantity: SetupQuantity| {
+        let ends = random.scatter(quantity).about(quantity.of(&setup)?);
+        let mut velocity = |value| {
+            let solver = Solver::new(&quantity.with(value, setup));
+            solver.arrival(&bone, &mut workspace).ok().map(|arrival| arrival.velocity)
+        };
+        let (below, above) = (velocity(ends[0])?, velocity(ends[1])?);
+        Some(((above - below) / (above + below)).abs())
+    };
+    random.random().filter_map(of_quantity).fold(0.0, f64::hypot)
+}
+
 fn rounded(velocity: f64) -> String {
     format!("{velocity:.0}")
 }
@@ -194,7 +238,7 @@ fn beyond(value: &str, side: &str, reached: &str, cure: &str) -> String {
 }
 
 /// Returns which bounds must be widened to get beyond this corner of the box.
-fn widened(ranges: &[Range; 7], corner: &Point) -> String {
+fn widened(ranges: &[Range; PARAMETERS], corner: &Point) -> String {
     let (mut lower_bounds, mut upper_bounds) = (Vec::new(), Vec::new());
     for parameter in Parameter::ALL {
         // Neither of these has much influence on the mean.

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::ensemble::DISPERSION_MAX;
+use crate::limits::QUALITY_FACTOR_MIN;
 use crate::parameters::Parameter;
 
 /// An interval of finite numbers with its unit.
@@ -69,14 +70,20 @@ impl Interval {
         Self { lower: Edge::Closed(lower), upper: Edge::Closed(upper), unit }
     }
 
-    /// Returns the values accepted for a parameter of the mean model, or the dispersion, regardless
-    /// of other fields.
+    const fn at_least(lower: f64, unit: &'static str) -> Self {
+        Self { lower: Edge::Closed(lower), upper: Edge::None, unit }
+    }
+
+    /// Returns the values accepted for a parameter, regardless of other fields.
     pub fn of(parameter: Parameter) -> Self {
         match parameter {
             Parameter::Density
             | Parameter::LongitudinalYoungModulus
             | Parameter::LongitudinalShearModulus
-            | Parameter::TransverseYoungModulus => Self::above(0.0, parameter.unit()),
+            | Parameter::TransverseYoungModulus
+            | Parameter::BoneThickness
+            | Parameter::CouplingSoundSpeed => Self::above(0.0, parameter.unit()),
+            Parameter::BoneQualityFactor => Self::at_least(QUALITY_FACTOR_MIN, ""),
             Parameter::LongitudinalPoissonRatio => Self::finite(""),
             Parameter::TransversePoissonRatio => Self::between(-1.0, 1.0, ""),
             Parameter::Dispersion => Self::between(0.0, DISPERSION_MAX, "that is √(7/11)"),

@@ -2,15 +2,18 @@
 //!
 //! The first arriving signal is a compressional wave along the bone. In a thick plate its velocity is
 //! about √(c1111/ρ) of the mean model. In a thin plate it is lower, but not below the bar velocity
-//! √(e_L/ρ). The coefficient of variation of the velocity is about δ/√14.
+//! √(e_L/ρ). The coefficient of variation of the velocity is about δ/√14, to which random quantities of
+//! the setup add theirs.
 
 use crate::bulk_velocity::bulk_velocity;
 use crate::case::Setup;
 use crate::job::{JobKind, JobSpecification, Measurements, Range};
 use crate::moments::Moments;
-use crate::parameters::{Parameter, Point};
+use crate::parameters::{PARAMETERS, Parameter, Point};
 use crate::plausible::short;
+use crate::random_quantities::RandomQuantities;
 use crate::sampling;
+use crate::setup_quantity::SetupQuantity;
 
 /// Factors: the smallest mean velocity is the first times √(e_L/ρ), the largest the second times
 /// √(c1111/ρ). In the paper's geometry mean velocities are 0.98 to 1.055 times √(c1111/ρ) throughout
@@ -43,35 +46,69 @@ pub struct AttainableMoments {
 }
 
 impl AttainableMoments {
-    /// Returns the ranges of the moments that points within `ranges` can have in `setup`.
-    pub fn from_ranges(ranges: &[Range; 7], setup: &Setup) -> Self {
-        let (density, modulus) =
-            (ends(ranges, Parameter::Density), ends(ranges, Parameter::LongitudinalYoungModulus));
-        let bar_velocity_min = (modulus.0 / density.1).sqrt();
-        let highest = highest_bulk_velocity_point(ranges);
-        let bulk_velocity_max = match highest.and_then(|point| bulk_velocity(&point).ok()) {
-            Some(velocity) if !is_near(setup) => libm::exp(velocity.logarithm),
-            _ => f64::INFINITY,
-        };
+    /// Returns the ranges of the moments that points within `ranges` can have in `setup`, of which
+    /// `random` makes some quantities random.
+    pub fn from_ranges(
+        ranges: &[Range; PARAMETERS],
+        setup: &Setup,
+        random: &RandomQuantities,
+    ) -> Self {
         let dispersion = ends(ranges, Parameter::Dispersion);
         let variation = |dispersion: f64, factor: f64| factor * dispersion / 14.0_f64.sqrt();
-        // An attenuated arrival consists of the pulse's frequencies and somewhat higher ones.
-        let (attenuation, center) = (&setup.layers.bone_attenuation, setup.probe.center_frequency);
-        let lowest = VELOCITY_FACTORS.0 * attenuation.speed(center) * bar_velocity_min;
-        let highest = VELOCITY_FACTORS.1 * attenuation.fastest(center) * bulk_velocity_max;
+        // Parameters of the setup change the velocities by less than the checks allow.
+        let setup = Point(ranges.map(|range| range.start())).setup(setup);
+        let scatter = scatter_of_velocity(ranges, &setup, random);
         Self {
-            velocity: (apparent(setup, lowest), apparent(setup, highest)),
+            velocity: velocities(ranges, &setup),
             variation: (
                 variation(dispersion.0, VARIATION_FACTORS.0),
-                variation(dispersion.1, VARIATION_FACTORS.1),
+                libm::hypot(variation(dispersion.1, VARIATION_FACTORS.1), scatter),
             ),
         }
     }
 }
 
+/// Returns the smallest and the largest mean velocity, m/s, that points within `ranges` can have.
+fn velocities(ranges: &[Range; PARAMETERS], setup: &Setup) -> (f64, f64) {
+    let (density, modulus) =
+        (ends(ranges, Parameter::Density), ends(ranges, Parameter::LongitudinalYoungModulus));
+    let bar_velocity_min = (modulus.0 / density.1).sqrt();
+    let highest = highest_bulk_velocity_point(ranges);
+    let bulk_velocity_max = match highest.and_then(|point| bulk_velocity(&point).ok()) {
+        Some(velocity) if !is_near(setup) => libm::exp(velocity.logarithm),
+        _ => f64::INFINITY,
+    };
+    // An attenuated arrival consists of the pulse's frequencies and somewhat higher ones.
+    let (attenuation, center) = (&setup.layers.bone_attenuation, setup.probe.center_frequency);
+    let lowest = VELOCITY_FACTORS.0 * attenuation.speed(center) * bar_velocity_min;
+    let highest = VELOCITY_FACTORS.1 * attenuation.fastest(center) * bulk_velocity_max;
+    (apparent(setup, lowest), apparent(setup, highest))
+}
+
+/// Returns the approximate coefficient of variation that random quantities of the setup give the
+/// velocity, from the velocities one standard deviation below and above their means. The bone's
+/// thickness is not part of [`velocities`], and changes them by less than the checks allow.
+fn scatter_of_velocity(
+    ranges: &[Range; PARAMETERS],
+    setup: &Setup,
+    random: &RandomQuantities,
+) -> f64 {
+    let of_quantity = |quantity: SetupQuantity| {
+        let mean = quantity.of(setup)?;
+        let [low, high] = random.scatter(quantity).about(mean);
+        let at = |value| velocities(ranges, &quantity.with(value, *setup));
+        let (below, above) = (at(low), at(high));
+        let relative = |below: f64, above: f64| ((above - below) / (above + below)).abs();
+        let ends = [relative(below.0, above.0), relative(below.1, above.1)];
+        // Without a largest velocity its scatter is not a number either.
+        ends.into_iter().filter(|scatter| scatter.is_finite()).reduce(f64::max)
+    };
+    random.random().filter_map(of_quantity).fold(0.0, libm::hypot)
+}
+
 /// Returns the point within `ranges` whose √(c1111/ρ) is smallest. It has the shear modulus and the
 /// dispersion of the start, as √(c1111/ρ) does not depend on them.
-pub fn lowest_bulk_velocity_point(ranges: &[Range; 7]) -> Point {
+pub fn lowest_bulk_velocity_point(ranges: &[Range; PARAMETERS]) -> Point {
     let (from, to) = ends(ranges, Parameter::LongitudinalYoungModulus);
     let e_t = ends(ranges, Parameter::TransverseYoungModulus).0;
     let nu_l = smallest_magnitude(ends(ranges, Parameter::LongitudinalPoissonRatio));
@@ -85,7 +122,7 @@ pub fn lowest_bulk_velocity_point(ranges: &[Range; 7]) -> Point {
 /// Returns the point within `ranges` whose √(c1111/ρ) is largest, with shear modulus and dispersion as
 /// in [`lowest_bulk_velocity_point`]. Returns `None` if √(c1111/ρ) is unbounded because the ranges
 /// contain the edge of admissibility.
-pub fn highest_bulk_velocity_point(ranges: &[Range; 7]) -> Option<Point> {
+pub fn highest_bulk_velocity_point(ranges: &[Range; PARAMETERS]) -> Option<Point> {
     let (from, to) = ends(ranges, Parameter::LongitudinalYoungModulus);
     let e_t = ends(ranges, Parameter::TransverseYoungModulus).1;
     let nu_l = largest_magnitude(ends(ranges, Parameter::LongitudinalPoissonRatio));
@@ -108,8 +145,11 @@ pub(crate) fn unattainable_data(
     if specification.kind != JobKind::Identification {
         return None;
     }
-    let attainable =
-        AttainableMoments::from_ranges(&specification.parameters, &specification.setup);
+    let attainable = AttainableMoments::from_ranges(
+        &specification.parameters,
+        &specification.setup,
+        &specification.random,
+    );
     let mut first = None;
     for set in 0..data.sets() {
         let count = data.count(set);
@@ -223,7 +263,7 @@ fn is_near(setup: &Setup) -> bool {
 }
 
 /// Returns the bounds of a parameter, or its fixed value twice.
-fn ends(ranges: &[Range; 7], parameter: Parameter) -> (f64, f64) {
+fn ends(ranges: &[Range; PARAMETERS], parameter: Parameter) -> (f64, f64) {
     match ranges[parameter as usize] {
         Range::Fixed(value) => (value, value),
         Range::Free { lower, upper, .. } => (lower, upper),
@@ -238,12 +278,19 @@ fn largest_magnitude((from, to): (f64, f64)) -> f64 {
     if from.abs() > to.abs() { from } else { to }
 }
 
-/// Returns the point with this density, e_L, ν_L, e_T and ν_T.
-fn corner(ranges: &[Range; 7], [density, e_l, nu_l, e_t, nu_t]: [f64; 5]) -> Point {
-    let start = |parameter: Parameter| ranges[parameter as usize].start();
-    let (shear, dispersion) =
-        (start(Parameter::LongitudinalShearModulus), start(Parameter::Dispersion));
-    Point([density, e_l, nu_l, shear, e_t, nu_t, dispersion])
+/// Returns the point of fixed values and starts, but with this density, e_L, ν_L, e_T and ν_T.
+fn corner(ranges: &[Range; PARAMETERS], [density, e_l, nu_l, e_t, nu_t]: [f64; 5]) -> Point {
+    let mut point = Point(ranges.map(|range| range.start()));
+    for (parameter, value) in [
+        (Parameter::Density, density),
+        (Parameter::LongitudinalYoungModulus, e_l),
+        (Parameter::LongitudinalPoissonRatio, nu_l),
+        (Parameter::TransverseYoungModulus, e_t),
+        (Parameter::TransversePoissonRatio, nu_t),
+    ] {
+        point.0[parameter as usize] = value;
+    }
+    point
 }
 
 #[cfg(test)]
@@ -253,8 +300,9 @@ mod tests {
     use crate::ensemble::Germs;
 
     /// Returns ranges that leave all parameters free within `bounds`.
-    fn free(bounds: [(f64, f64); 7]) -> [Range; 7] {
-        bounds.map(|(lower, upper)| Range::Free { start: 0.5 * (lower + upper), lower, upper })
+    fn free(bounds: [(f64, f64); 7]) -> [Range; PARAMETERS] {
+        let range = |(lower, upper)| Range::Free { start: 0.5 * (lower + upper), lower, upper };
+        Range::of_bone(bounds.map(range))
     }
 
     fn logarithm(point: &Point) -> f64 {
@@ -280,7 +328,9 @@ mod tests {
             for draw in 0..40 {
                 let germs = Germs::draw(6 + index, draw);
                 let mut germs = germs.values().iter().copied();
-                let point = Point(cut.map(|(from, to)| from + (to - from) * germs.next().unwrap()));
+                let point = Point::of_bone(
+                    cut.map(|(from, to)| from + (to - from) * germs.next().unwrap()),
+                );
                 let Ok(velocity) = bulk_velocity(&point) else { continue };
                 assert!(velocity.logarithm >= logarithm(&slow) - 1e-12, "{cut:?} {point:?}");
                 if let Some(fast) = fast {
@@ -296,7 +346,11 @@ mod tests {
     fn the_usual_box_has_no_highest_bulk_velocity() {
         let ranges = free(BOUNDS);
         assert_eq!(highest_bulk_velocity_point(&ranges), None);
-        let attainable = AttainableMoments::from_ranges(&ranges, &Setup::default());
+        let attainable = AttainableMoments::from_ranges(
+            &ranges,
+            &Setup::default(),
+            &RandomQuantities::default(),
+        );
         assert!((2400.0..2401.0).contains(&attainable.velocity.0), "{attainable:?}");
         assert_eq!(attainable.velocity.1, f64::INFINITY);
     }
@@ -309,7 +363,11 @@ mod tests {
             let (lower, upper) = BOUNDS[axis];
             ranges[axis] = Range::Free { start: OPTIMUM.0[axis], lower, upper };
         }
-        let attainable = AttainableMoments::from_ranges(&ranges, &Setup::default());
+        let attainable = AttainableMoments::from_ranges(
+            &ranges,
+            &Setup::default(),
+            &RandomQuantities::default(),
+        );
         let reported = |mean: f64, coefficient_of_variation: f64, count| {
             let data = Moments { mean, coefficient_of_variation };
             let found = attainable.unattainable_moment(data, count);
@@ -342,8 +400,18 @@ mod tests {
     fn near_receivers_have_no_largest_velocity() {
         let ranges = OPTIMUM.0.map(Range::Fixed);
         let mut setup = Setup::default();
-        assert!(AttainableMoments::from_ranges(&ranges, &setup).velocity.1 < 4200.0);
+        assert!(
+            AttainableMoments::from_ranges(&ranges, &setup, &RandomQuantities::default())
+                .velocity
+                .1
+                < 4200.0
+        );
         setup.probe.receivers.first_x1 = 7e-3;
-        assert_eq!(AttainableMoments::from_ranges(&ranges, &setup).velocity.1, f64::INFINITY);
+        assert_eq!(
+            AttainableMoments::from_ranges(&ranges, &setup, &RandomQuantities::default())
+                .velocity
+                .1,
+            f64::INFINITY
+        );
     }
 }

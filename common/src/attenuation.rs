@@ -13,6 +13,7 @@
 use std::f64::consts::PI;
 
 use crate::fields::{Condition, Fields, Key, Number, Section};
+use crate::limits::QUALITY_FACTOR_MIN;
 use crate::plausible::{FREQUENCY, QUALITY_FACTOR};
 
 /// Ratio, to the pulse's centre frequency, of the frequency whose waves count as the fastest. Waves of
@@ -42,7 +43,7 @@ impl Section for Attenuation {
         fields.optional_number(
             Key { name: "quality_factor", meaning },
             &mut self.quality_factor,
-            Number::at_least(2.0, &QUALITY_FACTOR),
+            Number::at_least(QUALITY_FACTOR_MIN, &QUALITY_FACTOR),
         );
         let condition = Condition {
             holds: self.quality_factor.is_some(),

@@ -5,7 +5,7 @@
 //! coefficient of variation: a search starts from its derivatives.
 
 use crate::elasticity::Inadmissible;
-use crate::parameters::Point;
+use crate::parameters::{PARAMETERS, Point, extended};
 
 /// ln √(c1111/ρ) at a point, with its derivatives with respect to the parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,7 +14,7 @@ pub struct BulkVelocity {
     pub logarithm: f64,
     /// Its derivatives with respect to [`crate::parameters::Parameter::ALL`], each per unit of
     /// that parameter (SI).
-    pub gradient: [f64; 7],
+    pub gradient: [f64; PARAMETERS],
 }
 
 /// Computes the velocity √(c1111/ρ) of the mean model at `point`.
@@ -38,15 +38,18 @@ pub fn bulk_velocity(point: &Point) -> Result<BulkVelocity, Inadmissible> {
     let stiffness = e_l * (e_l * (1.0 - nu_t) / margin);
     Ok(BulkVelocity {
         logarithm: 0.5 * (libm::log(stiffness) - libm::log(density)),
-        gradient: [
-            -0.5 / density,
-            1.0 / e_l - 0.5 * (1.0 - nu_t) / margin,
-            2.0 * e_t * nu_l / margin,
+        gradient: extended(
+            [
+                -0.5 / density,
+                1.0 / e_l - 0.5 * (1.0 - nu_t) / margin,
+                2.0 * e_t * nu_l / margin,
+                0.0,
+                nu_l * nu_l / margin,
+                0.5 * (e_l / margin - 1.0 / (1.0 - nu_t)),
+                0.0,
+            ],
             0.0,
-            nu_l * nu_l / margin,
-            0.5 * (e_l / margin - 1.0 / (1.0 - nu_t)),
-            0.0,
-        ],
+        ),
     })
 }
 
@@ -56,7 +59,7 @@ pub(crate) mod tests {
     use crate::ensemble::Germs;
 
     pub(crate) const OPTIMUM: Point =
-        Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+        Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     pub(crate) const BOUNDS: [(f64, f64); 7] = [
         (1500.0, 2000.0),
         (12e9, 25e9),
@@ -96,7 +99,7 @@ pub(crate) mod tests {
             let germs = Germs::draw(11, index);
             let mut germs = germs.values().iter();
             let point =
-                Point(BOUNDS.map(|(from, to)| {
+                Point::of_bone(BOUNDS.map(|(from, to)| {
                     from + (to - from) * germs.next().copied().unwrap_or_default()
                 }));
             let Ok(velocity) = bulk_velocity(&point) else { continue };

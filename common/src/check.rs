@@ -7,8 +7,11 @@ mod data;
 mod job;
 mod posterior;
 mod priors;
+mod random_quantities;
+mod range;
 mod section;
 mod setup;
+mod setup_parameters;
 mod value;
 
 use crate::job::JobSpecification;
@@ -17,6 +20,7 @@ use crate::violations::Violations;
 pub use self::data::{COUNT, DATA_FORMS, REPEATABILITY, VELOCITIES_MIN, VELOCITY, data, no_data};
 pub use self::job::{job, job_from};
 pub use self::posterior::posterior;
+pub use self::random_quantities::random_quantities;
 pub use self::setup::setup;
 pub use self::value::{number, quantity};
 

@@ -150,8 +150,8 @@ pub struct Spread {
 /// Spreads over a set of points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spreads {
-    /// Spread of each parameter.
-    pub parameters: [Spread; 7],
+    /// Spread of each parameter that the points have ([`Point::given`]), in their order.
+    pub parameters: Vec<(Parameter, Spread)>,
     /// Spreads of the entries of the elasticity matrix on and above the diagonal, row by row, with
     /// row and column from 0 (Pa, Kelvin-Mandel).
     pub entries: Vec<(usize, usize, Spread)>,

@@ -5,10 +5,10 @@ use crate::parameters::Point;
 
 /// BLAKE3 over the evaluations of a search's path, in order.
 ///
-/// Each evaluation adds its seven parameters, then for each index the code byte of the outcome
-/// (0 = success) and its velocity in m/s (0 on failure); every float as 8 bytes little-endian,
-/// nothing between them. The digest depends on these numbers alone: not on names, times or the
-/// program's version.
+/// Each evaluation adds its parameters (seven, and those of the setup that are searched), then for
+/// each index the code byte of the outcome (0 = success) and its velocity in m/s (0 on failure); every
+/// float as 8 bytes little-endian, nothing between them. The digest depends on these numbers alone: not
+/// on names, times or the program's version.
 #[derive(Debug, Clone, Default)]
 pub struct PathDigest(blake3::Hasher);
 
@@ -20,8 +20,8 @@ impl PathDigest {
 
     /// Appends one evaluation: its point and its outcomes in index order.
     pub fn add_evaluation(&mut self, point: &Point, outcomes: &[Outcome]) {
-        for parameter in point.0 {
-            self.0.update(&parameter.to_le_bytes());
+        for (_, value) in point.given() {
+            self.0.update(&value.to_le_bytes());
         }
         for &outcome in outcomes {
             let (code, velocity) = encode(outcome);
@@ -42,10 +42,11 @@ mod tests {
     use super::*;
     use crate::outcome::FailureKind;
 
-    const FIRST: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    const FIRST: Point =
+        Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     const FIRST_OUTCOMES: [Outcome; 3] =
         [Ok(3908.749494174314), Err(FailureKind::NoArrival), Ok(4056.3145)];
-    const SECOND: Point = Point([1700.0, 20e9, 0.3, 5e9, 10e9, 0.4, 0.2]);
+    const SECOND: Point = Point::of_bone([1700.0, 20e9, 0.3, 5e9, 10e9, 0.4, 0.2]);
     const SECOND_OUTCOMES: [Outcome; 2] = [Err(FailureKind::NoConvergence), Ok(0.1)];
 
     /// Compares with values computed by the Python package `blake3` over bytes packed with `struct`

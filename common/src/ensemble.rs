@@ -17,8 +17,12 @@ use crate::special::{GammaQuantile, root_gamma_moments, standard_normal_quantile
 /// random matrix has a finite mean square norm (C. Soize, J. Acoust. Soc. Am. 109 (2001)).
 pub const DISPERSION_MAX: f64 = 0.797_724_035_217_465_6;
 
-/// Number of germs of one realization: the entries of a triangular 6×6 matrix.
+/// Number of germs of one realization's elasticity: the entries of a triangular 6×6 matrix.
 pub const GERMS: usize = 21;
+/// Number of further germs, for random quantities of the setup
+/// ([`crate::random_quantities`]). They follow those of the elasticity, which are the same with and
+/// without them.
+pub const SETUP_GERMS: usize = 4;
 
 /// Largest double below 1.
 const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
@@ -72,6 +76,14 @@ impl Germs {
     /// Returns the first germ that [`Germs::draw`] draws, that of entry 11.
     pub(crate) fn first(seed: u64, index: u64) -> f64 {
         uniform(stream(seed, index).next_u64())
+    }
+
+    /// Returns the germs that follow those of [`Germs::draw`].
+    pub(crate) fn of_setup(seed: u64, index: u64) -> [f64; SETUP_GERMS] {
+        let mut rng = stream(seed, index);
+        // ChaCha20 counts words of 32 bits.
+        rng.set_word_pos(2 * GERMS as u128);
+        std::array::from_fn(|_| uniform(rng.next_u64()))
     }
 
     /// Makes each germ from the highest 53 of 64 bits, as [`Germs::draw`] does.
@@ -312,6 +324,14 @@ mod tests {
         for (seed, index, expected) in PINNED {
             assert_eq!(Germs::draw(seed, index).values(), &expected, "({seed}, {index})");
         }
+    }
+
+    #[test]
+    fn setup_germs_continue_the_stream() {
+        let mut rng = stream(5, 17);
+        let all: Vec<f64> = (0..GERMS + SETUP_GERMS).map(|_| uniform(rng.next_u64())).collect();
+        assert_eq!(all[..GERMS], *Germs::draw(5, 17).values());
+        assert_eq!(all[GERMS..], Germs::of_setup(5, 17));
     }
 
     #[test]

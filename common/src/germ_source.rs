@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::ensemble::{GERMS, Germs, uniform};
-use crate::sobol::Scramble;
+use crate::ensemble::{GERMS, Germs, SETUP_GERMS, uniform};
+use crate::sobol::{Scramble, ScrambledDimensions};
 
 /// Everything that determines the germs at every index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,15 +30,21 @@ pub enum GermScheme {
 #[derive(Debug, Clone)]
 pub(crate) struct GermMaker {
     source: GermSource,
-    /// Cached scrambles, each at the position given by its number modulo their count.
-    scrambles: Arc<[OnceLock<Box<Numbered>>; SCRAMBLES_KEPT]>,
+    of_elasticity: Scrambles<GERMS, 0>,
+    of_setup: Scrambles<SETUP_GERMS, GERMS>,
 }
+
+/// Scrambles of one seed, each cached at the position given by its number modulo their count.
+#[derive(Debug, Clone)]
+struct Scrambles<const COUNT: usize, const FIRST: usize>(
+    Arc<[OnceLock<Box<Numbered<COUNT, FIRST>>>; SCRAMBLES_KEPT]>,
+);
 
 /// A scramble and its number.
 #[derive(Debug)]
-struct Numbered {
+struct Numbered<const COUNT: usize, const FIRST: usize> {
     number: u64,
-    scramble: Scramble,
+    scramble: ScrambledDimensions<COUNT, FIRST>,
 }
 
 /// Number of consecutive scrambles that are cached for a batch of realizations, 4 kB each. A
@@ -68,17 +74,32 @@ impl PartialEq for GermMaker {
 
 impl GermMaker {
     pub(crate) fn new(source: GermSource) -> Self {
-        Self { source, scrambles: Arc::new([const { OnceLock::new() }; SCRAMBLES_KEPT]) }
+        Self { source, of_elasticity: Scrambles::new(), of_setup: Scrambles::new() }
     }
 
-    /// Returns the germs of one realization.
+    /// Returns the germs of one realization's elasticity.
     pub(crate) fn germs(&self, index: u64) -> Germs {
-        match self.source.scheme {
-            GermScheme::Streams => Germs::draw(self.source.seed, index),
+        let GermSource { seed, scheme } = self.source;
+        match scheme {
+            GermScheme::Streams => Germs::draw(seed, index),
             GermScheme::Sobol { points } => {
                 let points = points.max(1);
-                self.with_scramble(index / points, |scramble| {
+                self.of_elasticity.with(seed, index / points, |scramble| {
                     Germs::from_bits(scramble.point(index % points))
+                })
+            }
+        }
+    }
+
+    /// Returns the germs of one realization's setup.
+    pub(crate) fn setup_germs(&self, index: u64) -> [f64; SETUP_GERMS] {
+        let GermSource { seed, scheme } = self.source;
+        match scheme {
+            GermScheme::Streams => Germs::of_setup(seed, index),
+            GermScheme::Sobol { points } => {
+                let points = points.max(1);
+                self.of_setup.with(seed, index / points, |scramble| {
+                    scramble.coordinates(index % points).map(uniform)
                 })
             }
         }
@@ -100,11 +121,22 @@ impl GermMaker {
             }
         }
     }
+}
 
-    fn with_scramble<T>(&self, number: u64, then: impl FnOnce(&Scramble) -> T) -> T {
+impl<const COUNT: usize, const FIRST: usize> Scrambles<COUNT, FIRST> {
+    fn new() -> Self {
+        Self(Arc::new([const { OnceLock::new() }; SCRAMBLES_KEPT]))
+    }
+
+    fn with<T>(
+        &self,
+        seed: u64,
+        number: u64,
+        then: impl FnOnce(&ScrambledDimensions<COUNT, FIRST>) -> T,
+    ) -> T {
         let make =
-            || Box::new(Numbered { number, scramble: Scramble::new(self.source.seed, number) });
-        let kept = self.scrambles[(number % SCRAMBLES_KEPT as u64) as usize].get_or_init(make);
+            || Box::new(Numbered { number, scramble: ScrambledDimensions::new(seed, number) });
+        let kept = self.0[(number % SCRAMBLES_KEPT as u64) as usize].get_or_init(make);
         if kept.number == number { then(&kept.scramble) } else { then(&make().scramble) }
     }
 }
@@ -117,6 +149,7 @@ mod tests {
     fn independent_germs_are_those_of_their_stream() {
         let maker = GermMaker::new(GermSource::streams(5));
         assert_eq!(maker.germs(17), Germs::draw(5, 17));
+        assert_eq!(maker.setup_germs(17), Germs::of_setup(5, 17));
     }
 
     /// Requests more scrambles than are cached, forwards and backwards.
@@ -127,6 +160,10 @@ mod tests {
         let check = |index: u64| {
             let expected = Germs::from_bits(Scramble::new(9, index / 4).point(index % 4));
             assert_eq!(maker.germs(index), expected, "{index}");
+            let of_setup = ScrambledDimensions::<SETUP_GERMS, GERMS>::new(9, index / 4)
+                .coordinates(index % 4)
+                .map(uniform);
+            assert_eq!(maker.setup_germs(index), of_setup, "{index}");
         };
         let count = 4 * SCRAMBLES_KEPT as u64 + 10;
         (0..count).for_each(check);

@@ -3,7 +3,9 @@
 use crate::case::Setup;
 use crate::fields::{Key, Section};
 use crate::inference::data_noise;
-use crate::parameters::{Parameter, Point};
+use crate::parameters::{self, AS_IN_SETUP, BONE_PARAMETERS, PARAMETERS, Parameter, Point};
+use crate::random_quantities::RandomQuantities;
+use crate::realization::{Ensemble, PointError};
 
 pub use crate::data::{Data, Group, Measurements, NoVariation, VelocitySet};
 pub use crate::monte_carlo::{MonteCarlo, Sampling};
@@ -52,6 +54,15 @@ pub enum Range {
 pub const ON_BOUND: f64 = 1e-4;
 
 impl Range {
+    /// The range of a parameter of the setup that is not searched.
+    pub const AS_IN_SETUP: Self = Self::Fixed(AS_IN_SETUP);
+
+    /// Returns the ranges of all parameters, given those of [`Parameter::OF_BONE`]; those of the setup
+    /// are not searched.
+    pub const fn of_bone(ranges: [Self; BONE_PARAMETERS]) -> [Self; PARAMETERS] {
+        parameters::extended(ranges, Self::AS_IN_SETUP)
+    }
+
     /// Returns the distance of the bounds, in the parameter's unit; 0 if it is fixed.
     pub fn edge(&self) -> f64 {
         match *self {
@@ -94,7 +105,9 @@ pub struct JobSpecification {
     /// The measured velocities; present for an identification, absent for a propagation.
     pub data: Option<Data>,
     /// Ranges of [`Parameter::ALL`], in that order.
-    pub parameters: [Range; 7],
+    pub parameters: [Range; PARAMETERS],
+    /// Scatter of quantities of the setup.
+    pub random: RandomQuantities,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,
     /// The function to be minimised.
@@ -108,6 +121,8 @@ pub struct JobSpecification {
 /// The settings of a run that are sections of a job file.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RunSettings {
+    /// Scatter of quantities of the setup.
+    pub random: RandomQuantities,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,
     /// The function to be minimised.
@@ -118,8 +133,15 @@ pub struct RunSettings {
 
 impl RunSettings {
     /// Returns each section with its key, in the order of a canonical file.
-    pub fn sections(&mut self) -> [(Key, &mut dyn Section); 3] {
+    pub fn sections(&mut self) -> [(Key, &mut dyn Section); 4] {
         [
+            (
+                Key {
+                    name: "random",
+                    meaning: "quantities of the setup that differ from realization to realization",
+                },
+                &mut self.random,
+            ),
             (
                 Key { name: "monte_carlo", meaning: "settings of the Monte Carlo loop" },
                 &mut self.monte_carlo,
@@ -152,13 +174,21 @@ fn has_known_noise(data: &Data) -> bool {
 impl JobSpecification {
     /// Returns the settings of the run.
     pub fn run_settings(&self) -> RunSettings {
-        let &Self { monte_carlo, objective, search, .. } = self;
-        RunSettings { monte_carlo, objective, search }
+        let &Self { random, monte_carlo, objective, search, .. } = self;
+        RunSettings { random, monte_carlo, objective, search }
     }
 
     /// Returns the range of one parameter.
     pub fn range(&self, parameter: Parameter) -> Range {
         self.parameters[parameter as usize]
+    }
+
+    /// Returns the parameters that the job has: all of the bone, and those of the setup that are
+    /// searched.
+    pub fn parameters_given(&self) -> impl Iterator<Item = Parameter> + '_ {
+        let is_free = |parameter: &Parameter| matches!(self.range(*parameter), Range::Free { .. });
+        let searched = Parameter::OF_SETUP.into_iter().filter(is_free);
+        Parameter::OF_BONE.into_iter().chain(searched)
     }
 
     /// Returns the contribution of the priors to the cost of a point: the sum of w (p -
@@ -222,6 +252,14 @@ impl JobSpecification {
             self.search.cost_tolerance = Search::default_tolerance(method, self.objective);
         }
         self
+    }
+
+    /// Returns the realizations at a point.
+    ///
+    /// # Errors
+    /// Same as [`Ensemble::drawn`].
+    pub fn ensemble(&self, point: &Point) -> Result<Ensemble, PointError> {
+        Ok(Ensemble::drawn(point, self.monte_carlo.germs())?.with_random(self.random))
     }
 
     /// Returns the point of fixed values and starts.

@@ -1,6 +1,8 @@
 //! Limits that several crates share. The unit is in the name or in the comment. Other limits are beside
 //! the code that uses them.
 
+/// Smallest quality factor that is accepted.
+pub(crate) const QUALITY_FACTOR_MIN: f64 = 2.0;
 /// Minimum number of receivers of a probe: with fewer, the fit of a line leaves no residuals.
 pub const RECEIVERS_MIN: u32 = 3;
 /// Maximum number of receivers of a probe.

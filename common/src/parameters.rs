@@ -1,13 +1,23 @@
-//! The seven parameters of the identification: the mean model a = (ρ, e_L, ν_L, g_L, e_T, ν_T)
-//! and the dispersion δ (the paper, Sec. 5).
+//! The parameters of the identification: the mean model a = (ρ, e_L, ν_L, g_L, e_T, ν_T) and the
+//! dispersion δ (the paper, Sec. 5), and quantities of the setup that may be searched with them.
+
+use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::elasticity::EngineeringConstants;
 
-/// One of the seven parameters. The order of the variants is the order of the columns of
-/// `history.csv`, of the digest and of every vector of seven numbers.
+/// Number of all parameters.
+pub const PARAMETERS: usize = BONE_PARAMETERS + 3;
+/// Number of the parameters that every job has.
+pub const BONE_PARAMETERS: usize = 7;
+/// The number that stands in a point for a parameter of the setup that is not searched: the setup's
+/// value holds. All valid values are above it.
+pub const AS_IN_SETUP: f64 = 0.0;
+
+/// One of the parameters. The order of the variants is the order of the columns of `history.csv`, of
+/// the digest and of every vector of numbers of all parameters.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
@@ -27,11 +37,17 @@ pub enum Parameter {
     TransversePoissonRatio,
     /// Dispersion δ of the random elasticity.
     Dispersion,
+    /// Thickness of the bone, m.
+    BoneThickness,
+    /// Quality factor of the bone.
+    BoneQualityFactor,
+    /// Speed of sound of the coupling layer, m/s.
+    CouplingSoundSpeed,
 }
 
 impl Parameter {
-    /// All seven parameters, in their order.
-    pub const ALL: [Self; 7] = [
+    /// All parameters, in their order.
+    pub const ALL: [Self; PARAMETERS] = [
         Self::Density,
         Self::LongitudinalYoungModulus,
         Self::LongitudinalPoissonRatio,
@@ -39,7 +55,22 @@ impl Parameter {
         Self::TransverseYoungModulus,
         Self::TransversePoissonRatio,
         Self::Dispersion,
+        Self::BoneThickness,
+        Self::BoneQualityFactor,
+        Self::CouplingSoundSpeed,
     ];
+
+    /// The parameters that every job has: mean model and dispersion.
+    pub const OF_BONE: [Self; BONE_PARAMETERS] = {
+        let [density, e_l, nu_l, g_l, e_t, nu_t, dispersion, ..] = Self::ALL;
+        [density, e_l, nu_l, g_l, e_t, nu_t, dispersion]
+    };
+
+    /// The others, quantities of the setup that a job may search.
+    pub const OF_SETUP: [Self; PARAMETERS - BONE_PARAMETERS] = {
+        let [.., thickness, quality, speed] = Self::ALL;
+        [thickness, quality, speed]
+    };
 
     /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
@@ -51,6 +82,9 @@ impl Parameter {
             Self::TransverseYoungModulus => "transverse_young_modulus",
             Self::TransversePoissonRatio => "transverse_poisson_ratio",
             Self::Dispersion => "dispersion",
+            Self::BoneThickness => "bone_thickness",
+            Self::BoneQualityFactor => "bone_quality_factor",
+            Self::CouplingSoundSpeed => "coupling_sound_speed",
         }
     }
 
@@ -61,16 +95,50 @@ impl Parameter {
             Self::LongitudinalYoungModulus
             | Self::LongitudinalShearModulus
             | Self::TransverseYoungModulus => "Pa",
-            Self::LongitudinalPoissonRatio | Self::TransversePoissonRatio | Self::Dispersion => "",
+            Self::LongitudinalPoissonRatio
+            | Self::TransversePoissonRatio
+            | Self::Dispersion
+            | Self::BoneQualityFactor => "",
+            Self::BoneThickness => "m",
+            Self::CouplingSoundSpeed => "m/s",
         }
     }
 }
 
-/// A point (a, δ) of the search space: the values of [`Parameter::ALL`], SI units.
+/// A point of the search space: the values of [`Parameter::ALL`], SI units, and [`AS_IN_SETUP`] for
+/// those of the setup that are not searched.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point(pub [f64; 7]);
+pub struct Point(pub [f64; PARAMETERS]);
+
+/// Extends values of [`Parameter::OF_BONE`] to all parameters, by the same value for all others.
+pub const fn extended<T: Copy>(of_bone: [T; BONE_PARAMETERS], others: T) -> [T; PARAMETERS] {
+    let [density, e_l, nu_l, g_l, e_t, nu_t, dispersion] = of_bone;
+    [density, e_l, nu_l, g_l, e_t, nu_t, dispersion, others, others, others]
+}
+
+/// The numbers of the parameters that the point has.
+impl fmt::Display for Point {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.given().map(|(_, value)| value)).finish()
+    }
+}
 
 impl Point {
+    /// Creates a point (a, δ) for the values of the setup.
+    pub const fn of_bone(values: [f64; BONE_PARAMETERS]) -> Self {
+        Self(extended(values, AS_IN_SETUP))
+    }
+
+    /// Returns the parameters that the point has, with their values: all of the bone, and those of the
+    /// setup that are searched.
+    pub fn given(&self) -> impl Iterator<Item = (Parameter, f64)> + '_ {
+        let of = |parameter: Parameter| (parameter, self.get(parameter));
+        let has = |(parameter, value): &(Parameter, f64)| {
+            (*parameter as usize) < BONE_PARAMETERS || *value != AS_IN_SETUP
+        };
+        Parameter::ALL.into_iter().map(of).filter(has)
+    }
+
     /// Returns the value of one parameter.
     pub fn get(&self, parameter: Parameter) -> f64 {
         self.0[parameter as usize]

@@ -182,7 +182,7 @@ const DISPERSION: PlausibleRange = PlausibleRange {
 };
 
 impl PlausibleRange {
-    /// Returns the prior knowledge about a parameter of the mean model, or the dispersion.
+    /// Returns the prior knowledge about a parameter.
     pub fn of(parameter: Parameter) -> Self {
         match parameter {
             Parameter::Density => DENSITY,
@@ -193,6 +193,9 @@ impl PlausibleRange {
                 POISSON_RATIO
             }
             Parameter::Dispersion => DISPERSION,
+            Parameter::BoneThickness => BONE_THICKNESS,
+            Parameter::BoneQualityFactor => QUALITY_FACTOR,
+            Parameter::CouplingSoundSpeed => SOUND_SPEED,
         }
     }
 

@@ -94,7 +94,7 @@ impl PosteriorSummary {
 /// One draw from the posterior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosteriorDraw {
-    /// The seven parameters.
+    /// The parameters.
     pub point: Point,
     /// Logarithm of the posterior density (likelihood times prior, not normalised), nats.
     pub log_density: f64,

@@ -2,6 +2,7 @@
 
 use crate::accepted::WholeRange;
 use crate::fields::{self, Fields, Key, Section};
+use crate::parameters::PARAMETERS;
 
 fields::choices!(PriorDistribution);
 
@@ -19,7 +20,7 @@ pub struct PosteriorSettings {
     pub max_evaluations: u64,
     /// Priors of [`Parameter::ALL`](crate::parameters::Parameter::ALL), in that order; those of
     /// fixed parameters have no effect.
-    pub priors: [PosteriorPrior; 7],
+    pub priors: [PosteriorPrior; PARAMETERS],
 }
 
 /// Prior law of one parameter within its bounds.
@@ -112,7 +113,7 @@ impl PosteriorSettings {
 
 impl Default for PosteriorSettings {
     fn default() -> Self {
-        Self { draws: 2_000, max_evaluations: 400, priors: [PosteriorPrior::default(); 7] }
+        Self { draws: 2_000, max_evaluations: 400, priors: [PosteriorPrior::default(); PARAMETERS] }
     }
 }
 

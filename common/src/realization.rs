@@ -1,22 +1,25 @@
-//! One realization: the bone's material from (point, seed, index).
+//! One realization: the bone's material, and its random setup, from (point, seed, index).
 
 use thiserror::Error;
 
-use crate::case::Bone;
+use crate::case::{Bone, Setup};
 use crate::elasticity::{Inadmissible, NotElastic};
 use crate::ensemble::{ElasticityLaw, LawError};
 use crate::germ_source::{GermMaker, GermSource};
 use crate::parameters::Point;
+use crate::random_quantities::RandomQuantities;
 
-/// The bones of one point of the search: everything that determines the material at each index.
+/// The realizations of one point of the search: everything that determines the material at each index,
+/// and how its setup differs from the job's.
 ///
 /// All code that needs a realization uses this type, whether a worker or a user's inspection: the
 /// same point, seed and index give the same bits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ensemble {
-    density: f64,
+    point: Point,
     law: ElasticityLaw,
     germs: GermMaker,
+    random: RandomQuantities,
 }
 
 /// Reason why a point has no ensemble.
@@ -50,7 +53,29 @@ impl Ensemble {
         }
         let mean = point.constants().elasticity()?;
         let law = ElasticityLaw::new(&mean, point.dispersion())?;
-        Ok(Self { density, law, germs: GermMaker::new(germs) })
+        let (germs, random) = (GermMaker::new(germs), RandomQuantities::default());
+        Ok(Self { point: *point, law, germs, random })
+    }
+
+    /// Makes quantities of the setup random.
+    #[must_use]
+    pub fn with_random(self, random: RandomQuantities) -> Self {
+        Self { random, ..self }
+    }
+
+    /// Returns the setup of the realization at `index`, given that of the job or that of its point;
+    /// `None` if it is the one given, as no quantity is random or searched.
+    pub fn own_setup(&self, index: u64, setup: &Setup) -> Option<Setup> {
+        let of_point = self.point.setup(setup);
+        if self.random.is_any() {
+            return Some(self.random.draw(&of_point, &self.germs.setup_germs(index)));
+        }
+        (of_point != *setup).then_some(of_point)
+    }
+
+    /// Returns the setup of the realization at `index`, given that of the job.
+    pub fn setup(&self, index: u64, setup: &Setup) -> Setup {
+        self.own_setup(index, setup).unwrap_or(*setup)
     }
 
     /// Returns the bone at `index`.
@@ -60,20 +85,22 @@ impl Ensemble {
     /// [`ElasticityLaw::realize`]).
     pub fn bone(&self, index: u64) -> Result<Bone, NotElastic> {
         let elasticity = self.law.realize(&self.germs.germs(index))?;
-        Ok(Bone { density: self.density, elasticity })
+        Ok(Bone { density: self.point.density(), elasticity })
     }
 
     /// Returns √(c1111/ρ), m/s, of the bones at 0, 1, … `count` - 1, to the bit. The other
     /// constants are not computed, which saves 99 % of the work. A speed may exist even if the
     /// whole bone does not.
     pub(crate) fn longitudinal_speeds(&self, count: u64) -> impl Iterator<Item = f64> {
-        self.germs.first_germs(count).map(|germ| (self.law.c1111(germ) / self.density).sqrt())
+        self.germs
+            .first_germs(count)
+            .map(|germ| (self.law.c1111(germ) / self.point.density()).sqrt())
     }
 
     /// Returns mean, m/s, and variance, m²/s², of √(c1111/ρ) under the law.
     pub(crate) fn longitudinal_speed_moments(&self) -> (f64, f64) {
         let (mean, variance) = self.law.root_c1111_moments();
-        (mean / self.density.sqrt(), variance / self.density)
+        (mean / self.point.density().sqrt(), variance / self.point.density())
     }
 }
 
@@ -83,7 +110,8 @@ mod tests {
     use crate::germ_source::GermScheme;
     use crate::statistics;
 
-    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    const OPTIMUM: Point =
+        Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
     #[test]
     fn a_bone_is_a_function_of_point_seed_and_index() {

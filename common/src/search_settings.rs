@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::accepted::{Interval, WholeRange};
 use crate::fields::{self, Fields, Key, Number, Section};
 use crate::limits::{EVALUATIONS_MAX, STARTS_MAX};
+use crate::parameters::PARAMETERS;
 
 fields::choices!(Objective, SearchMethod);
 
@@ -113,7 +114,7 @@ pub struct Search {
     pub sensitivities: bool,
     /// Values that are expected for the free ones of
     /// [`Parameter::ALL`](crate::parameters::Parameter::ALL), in that order.
-    pub priors: [Option<Prior>; 7],
+    pub priors: [Option<Prior>; PARAMETERS],
 }
 
 impl Search {
@@ -128,7 +129,7 @@ impl Search {
             starts: 1,
             first_start: 0,
             sensitivities: true,
-            priors: [None; 7],
+            priors: [None; PARAMETERS],
         }
     }
 

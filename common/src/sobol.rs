@@ -2,16 +2,16 @@
 //!
 //! The sequence of I. M. Sobol' (USSR Comput. Math. Math. Phys. 7 (1967)) with the direction
 //! numbers of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30 (2008), 2635-2654), of which the first
-//! 21 dimensions are used. A scramble multiplies the digits of each coordinate by a random lower
-//! triangular matrix with a unit diagonal and adds a random shift (J. Matoušek, J. Complexity 14
-//! (1998), 527-556). Every point is then uniform in the cube, every scramble is as evenly
+//! 25 dimensions are used: 21 for the elasticity, and four for random quantities of the setup. A
+//! scramble multiplies the digits of each coordinate by a random lower triangular matrix with a unit
+//! diagonal and adds a random shift (J. Matoušek, J. Complexity 14 (1998), 527-556). Every point is then uniform in the cube, every scramble is as evenly
 //! distributed as the sequence itself, and independent scrambles allow the error of their mean to
 //! be estimated.
 
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use crate::ensemble::GERMS;
+use crate::ensemble::{GERMS, SETUP_GERMS};
 
 /// Binary digits of an index: [`crate::limits::REALIZATIONS_MAX`] is below 2²⁴.
 const INDEX_DIGITS: usize = 24;
@@ -20,9 +20,9 @@ const DIGITS: usize = 64;
 /// Bytes 8 to 12 of the key, so that no stream of independent germs equals that of a scramble.
 const KEY_MARK: [u8; 5] = *b"sobol";
 
-/// Primitive polynomials and initial direction numbers of dimensions 2 to 21: the degree, the inner
+/// Primitive polynomials and initial direction numbers of dimensions 2 to 25: the degree, the inner
 /// coefficients as a binary number, and m₁, m₂, …
-const DIRECTIONS: [(u32, u32, &[u32]); GERMS - 1] = [
+const DIRECTIONS: [(u32, u32, &[u32]); GERMS + SETUP_GERMS - 1] = [
     (1, 0, &[1]),
     (2, 1, &[1, 3]),
     (3, 1, &[1, 3, 1]),
@@ -43,23 +43,30 @@ const DIRECTIONS: [(u32, u32, &[u32]); GERMS - 1] = [
     (6, 25, &[1, 1, 5, 5, 19, 61]),
     (7, 1, &[1, 3, 7, 11, 23, 15, 103]),
     (7, 4, &[1, 3, 7, 13, 13, 15, 69]),
+    (7, 7, &[1, 1, 3, 13, 7, 35, 63]),
+    (7, 8, &[1, 3, 5, 9, 1, 25, 53]),
+    (7, 14, &[1, 3, 1, 13, 9, 35, 107]),
+    (7, 19, &[1, 3, 1, 5, 27, 61, 31]),
 ];
 
-/// The germ, numbered by rows of L_G, for which each dimension of the sequence is used. The earlier
-/// a dimension, the more evenly its points are distributed, and 11, 55, 33, 23, 22, 13, 12
-/// influence the velocity most, in this order; the rest follow by rows.
+/// The germ, numbered by rows of L_G, for which each of the first 21 dimensions of the sequence is
+/// used. The earlier a dimension, the more evenly its points are distributed, and 11, 55, 33, 23, 22,
+/// 13, 12 influence the velocity most, in this order; the rest follow by rows.
 const GERM_OF_DIMENSION: [usize; GERMS] =
     [0, 18, 11, 7, 6, 2, 1, 3, 4, 5, 8, 9, 10, 12, 13, 14, 15, 16, 17, 19, 20];
 
-/// One scramble of the sequence.
+/// One scramble of the germs of the elasticity.
+pub(crate) type Scramble = ScrambledDimensions<GERMS, 0>;
+
+/// One scramble of `COUNT` dimensions of the sequence, from dimension `FIRST` (from 0) on.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Scramble {
+pub(crate) struct ScrambledDimensions<const COUNT: usize, const FIRST: usize> {
     /// For each dimension, the contribution of each digit of the index (exclusive or).
-    columns: [[u64; INDEX_DIGITS]; GERMS],
-    shift: [u64; GERMS],
+    columns: [[u64; INDEX_DIGITS]; COUNT],
+    shift: [u64; COUNT],
 }
 
-impl Scramble {
+impl<const COUNT: usize, const FIRST: usize> ScrambledDimensions<COUNT, FIRST> {
     /// Creates scramble `number` of the job with this seed.
     ///
     /// ChaCha20, the seed in bytes 0-7 of the key (little-endian), "sobol" in bytes 8-12, the
@@ -72,32 +79,25 @@ impl Scramble {
         key[8..13].copy_from_slice(&KEY_MARK);
         let mut rng = ChaCha20Rng::from_seed(key);
         rng.set_stream(number);
-        let mut scramble = Self { columns: [[0; INDEX_DIGITS]; GERMS], shift: [0; GERMS] };
-        for dimension in 0..GERMS {
+        // ChaCha20 counts words of 32 bits.
+        rng.set_word_pos(2 * (DIGITS * FIRST) as u128);
+        let mut scramble = Self { columns: [[0; INDEX_DIGITS]; COUNT], shift: [0; COUNT] };
+        for dimension in 0..COUNT {
             let mut rows = [1 << (DIGITS - 1); DIGITS];
             for (row, matrix_row) in rows.iter_mut().enumerate().skip(1) {
                 let left = u64::MAX << (DIGITS - row);
                 *matrix_row = (rng.next_u64() & left) | (1 << (DIGITS - 1 - row));
             }
-            scramble.columns[dimension] = directions(dimension).map(|v| product(&rows, v));
+            scramble.columns[dimension] = directions(FIRST + dimension).map(|v| product(&rows, v));
             scramble.shift[dimension] = rng.next_u64();
         }
         scramble
     }
 
-    /// Returns the coordinates of point `index`, below 2²⁴, in the order of the germs. Each of
+    /// Returns the coordinates of point `index`, below 2²⁴, in the order of the dimensions. Each of
     /// their digits is 0 or 1 with probability ½.
-    pub(crate) fn point(&self, index: u64) -> [u64; GERMS] {
-        let mut point = [0; GERMS];
-        for (dimension, &germ) in GERM_OF_DIMENSION.iter().enumerate() {
-            point[germ] = self.coordinate(dimension, index);
-        }
-        point
-    }
-
-    /// Returns the coordinate of germ 11 alone, which is the first in both orders.
-    pub(crate) fn first(&self, index: u64) -> u64 {
-        self.coordinate(0, index)
+    pub(crate) fn coordinates(&self, index: u64) -> [u64; COUNT] {
+        std::array::from_fn(|dimension| self.coordinate(dimension, index))
     }
 
     fn coordinate(&self, dimension: usize, index: u64) -> u64 {
@@ -107,6 +107,22 @@ impl Scramble {
             coordinate ^= column & ((index >> digit) & 1).wrapping_neg();
         }
         coordinate
+    }
+}
+
+impl Scramble {
+    /// Returns the coordinates of point `index`, below 2²⁴, in the order of the germs.
+    pub(crate) fn point(&self, index: u64) -> [u64; GERMS] {
+        let mut point = [0; GERMS];
+        for (coordinate, germ) in self.coordinates(index).into_iter().zip(GERM_OF_DIMENSION) {
+            point[germ] = coordinate;
+        }
+        point
+    }
+
+    /// Returns the coordinate of germ 11 alone, which is the first in both orders.
+    pub(crate) fn first(&self, index: u64) -> u64 {
+        self.coordinate(0, index)
     }
 }
 
@@ -167,7 +183,7 @@ mod tests {
 
     #[test]
     fn direction_numbers_are_odd_and_fit_their_digit() {
-        for dimension in 0..GERMS {
+        for dimension in 0..GERMS + SETUP_GERMS {
             for (column, value) in directions(dimension).into_iter().enumerate() {
                 let m = value >> (DIGITS - 1 - column);
                 assert!(m % 2 == 1 && m < 2 << column, "{dimension} {column}: {m}");
@@ -192,6 +208,21 @@ mod tests {
                 }
             }
             assert_eq!(seen, [[true; 64]; GERMS], "({seed}, {number}, {block})");
+        }
+    }
+
+    /// The generator continues where that of the elasticity's germs ends, and so do the dimensions.
+    #[test]
+    fn setup_germs_follow_those_of_the_elasticity() {
+        type Both = ScrambledDimensions<{ GERMS + SETUP_GERMS }, 0>;
+        for (seed, number) in [(1, 0), (7, 3)] {
+            let (both, elasticity) = (Both::new(seed, number), Scramble::new(seed, number));
+            let setup = ScrambledDimensions::<SETUP_GERMS, GERMS>::new(seed, number);
+            for index in [0, 1, 77, 4096] {
+                let all = both.coordinates(index);
+                assert_eq!(all[..GERMS], elasticity.coordinates(index));
+                assert_eq!(all[GERMS..], setup.coordinates(index));
+            }
         }
     }
 

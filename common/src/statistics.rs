@@ -175,7 +175,8 @@ mod tests {
     use crate::ensemble::Germs;
     use crate::outcome::FailureKind;
 
-    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    const OPTIMUM: Point =
+        Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
     fn plain(outcomes: &[Outcome]) -> Option<Estimate> {
         estimate(&MonteCarlo::default(), &OPTIMUM, outcomes)

@@ -40,6 +40,13 @@ impl Violations {
         Self::default()
     }
 
+    /// Returns the first of the violations that `record` records.
+    pub(crate) fn first_of(record: impl FnOnce(&mut Self)) -> Option<Violation> {
+        let mut violations = Self::new();
+        record(&mut violations);
+        violations.iter().next().cloned()
+    }
+
     /// Records a violation of `field`.
     pub fn add(&mut self, field: impl Into<String>, message: impl Into<String>) {
         self.0.push(Violation { field: field.into(), message: message.into(), more: false });

@@ -64,7 +64,7 @@ pub fn job_warnings_from(
 ) -> Vec<Warning> {
     let mut warnings = Warnings::default();
     warnings.setup(&specification.setup);
-    for parameter in Parameter::ALL {
+    for parameter in specification.parameters_given() {
         warnings.parameter(parameter, specification.range(parameter));
     }
     if let Some(data) = &specification.data {

@@ -21,7 +21,7 @@ const IDENTITY: Matrix = {
 };
 
 fn point(dispersion: f64) -> Point {
-    Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion])
+    Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion])
 }
 
 #[test]

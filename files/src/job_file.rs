@@ -15,6 +15,7 @@ use osteon_common::job::{
     JobKind, JobSpecification, MonteCarlo, Objective, Omitted, PosteriorSettings, Search,
 };
 use osteon_common::limits;
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::warnings::{self, Warning};
 
 use crate::document::{self, Format};
@@ -107,6 +108,7 @@ fn parse_with_warnings(
         "solver",
         "data",
         "parameters",
+        "random",
         "monte_carlo",
         "objective",
         "search",
@@ -125,7 +127,8 @@ fn parse_with_warnings(
         kind,
         setup,
         data,
-        parameters: parameters::read(&mut reader, &table),
+        parameters: parameters::read(&mut reader, &table, &setup),
+        random: random(&mut reader, &table),
         monte_carlo: monte_carlo(&mut reader, &table),
         objective,
         search,
@@ -154,6 +157,12 @@ pub(crate) fn setup(reader: &mut Reader, root: &Table<'_>) -> Setup {
         reader::section(reader, root, key.name, section);
     }
     setup
+}
+
+fn random(reader: &mut Reader, root: &Table<'_>) -> RandomQuantities {
+    let mut random = RandomQuantities::default();
+    reader::section(reader, root, "random", &mut random);
+    random
 }
 
 fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {

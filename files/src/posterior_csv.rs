@@ -8,11 +8,12 @@ use osteon_common::results::JobResult;
 
 use crate::results_csv::{field, number};
 
-/// Returns the text of `posterior.csv`: one row per draw, with the seven parameters (kg/m³, Pa)
+/// Returns the text of `posterior.csv`: one row per draw, with the parameters (SI units)
 /// between its number and √(c1111/ρ), the moments of the model's velocities (m/s) and the logarithm
 /// of the density (nats); with groups, the rows of one group after another.
 pub fn posterior(specification: &JobSpecification, result: &JobResult) -> String {
-    let parameters = Parameter::ALL.map(Parameter::name).join(",");
+    let parameters: Vec<_> = specification.parameters_given().map(Parameter::name).collect();
+    let parameters = parameters.join(",");
     let moments = "mean,coefficient_of_variation";
     let mut out = format!("draw,{parameters},bulk_velocity,{moments},log_density");
     let grouped = specification.data.as_ref().is_some_and(Data::is_grouped);
@@ -31,7 +32,8 @@ fn add(out: &mut String, posterior: Option<&Posterior>, end: &str) {
         out.push_str(&place.to_string());
         let PosteriorDraw { point, log_density, mean, coefficient_of_variation } = draw;
         let derived = [speed(point), Some(*mean), Some(*coefficient_of_variation)];
-        let numbers = point.0.map(Some).into_iter().chain(derived).chain([Some(*log_density)]);
+        let numbers =
+            point.given().map(|(_, value)| Some(value)).chain(derived).chain([Some(*log_density)]);
         for value in numbers {
             out.push(',');
             out.push_str(&number(value));

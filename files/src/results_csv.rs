@@ -11,13 +11,14 @@ use osteon_common::parameters::Parameter;
 use osteon_common::posterior::{Posterior, PosteriorSummary};
 use osteon_common::results::{DataSummary, Evaluation, GroupResult, JobResult, Status};
 
-/// Returns the text of `history.csv`: one row per evaluation of the search, with the seven
+/// Returns the text of `history.csv`: one row per evaluation of the search, with the
 /// parameters between its number and its moments; with groups or several starts, also the group and
 /// start.
 ///
 /// Moments are empty if every realization failed; a cost is `inf` at an infeasible point.
 pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> String {
-    let parameters = Parameter::ALL.map(Parameter::name).join(",");
+    let parameters: Vec<_> = specification.parameters_given().map(Parameter::name).collect();
+    let parameters = parameters.join(",");
     let names: Vec<&str> = specification.data.iter().flat_map(Data::names).collect();
     let several = specification.search.starts > 1;
     let mut out = format!("evaluation,{parameters},mean,coefficient_of_variation,cost,failures");
@@ -64,7 +65,7 @@ const FORMULA: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋',
 
 fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
     write!(out, "{}", evaluation.number)?;
-    for value in evaluation.point.0 {
+    for (_, value) in evaluation.point.given() {
         write!(out, ",{value:?}")?;
     }
     let moments = evaluation.moments;
@@ -97,7 +98,7 @@ pub fn groups(
     // The dispersion has its own columns whether it is free or not.
     let elastic = Parameter::ALL.into_iter().filter(|name| *name != Parameter::Dispersion);
     let free: Vec<Parameter> = elastic.filter(free).collect();
-    let mut out = header(&free);
+    let mut out = header(specification, &free);
     for (set, group) in result.groups.iter().enumerate() {
         let best = group.best.as_ref();
         let mut fields = vec![
@@ -110,7 +111,8 @@ pub fn groups(
             fields.push(number(quantity.map(|quantity| quantity.value)));
             fields.extend(ends(quantity.and_then(|quantity| quantity.interval)));
         }
-        fields.extend(Parameter::ALL.map(|name| number(best.map(|best| best.point.get(name)))));
+        let of_best = |name| number(best.map(|best| best.point.get(name)));
+        fields.extend(specification.parameters_given().map(of_best));
         fields.extend(free.iter().flat_map(|&name| identified(name, group)));
         fields.extend(measured(group));
         fields.push(best.map_or_else(String::new, |best| best.failures.total().to_string()));
@@ -124,15 +126,16 @@ pub fn groups(
     out
 }
 
-/// Returns the header of `groups.csv`, given the free parameters of the mean model.
-fn header(free: &[Parameter]) -> String {
+/// Returns the header of `groups.csv`, given the free parameters other than the dispersion.
+fn header(specification: &JobSpecification, free: &[Parameter]) -> String {
     let with_interval =
         |name: &str| [name.to_owned(), format!("{name}_lower"), format!("{name}_upper")];
     let single = |name: &str| vec![name.to_owned()];
     let columns = ["group", "velocities", "status", "cost"].into_iter().flat_map(single);
     let columns =
         columns.chain(["bulk_velocity", "dispersion"].into_iter().flat_map(with_interval));
-    let columns = columns.chain(Parameter::ALL.map(|name| format!("best_{}", name.name())));
+    let best = specification.parameters_given().map(|name| format!("best_{}", name.name()));
+    let columns = columns.chain(best);
     let columns = columns.chain(free.iter().flat_map(|name| with_interval(name.name())));
     let data = ["data_mean", "data_coefficient_of_variation"];
     let columns = columns.chain(data.into_iter().flat_map(with_interval));

@@ -36,7 +36,7 @@ pub fn job(specification: &JobSpecification) -> String {
         if let Some(given) = &specification.data {
             data(out, given)?;
         }
-        for parameter in Parameter::ALL {
+        for parameter in specification.parameters_given() {
             range(out, parameter, specification.range(parameter))?;
         }
         run(out, specification)

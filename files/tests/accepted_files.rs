@@ -18,6 +18,7 @@ use osteon_common::job::{Sampling, SearchMethod};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Parameter;
 use osteon_common::probe::{Probe, Receivers, Source};
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_files::document::Format;
 use osteon_files::{case_file, job_file};
@@ -87,7 +88,7 @@ fn a_minimal_job_has_the_documented_defaults() {
         kind: JobKind::Identification,
         setup: DEFAULT_SETUP,
         data: Some(Data::from_moments(3906.0, 0.027)),
-        parameters: [
+        parameters: Range::of_bone([
             Range::Fixed(1598.8),
             Range::Free { start: 15e9, lower: 12e9, upper: 25e9 },
             Range::Fixed(0.3816),
@@ -95,7 +96,8 @@ fn a_minimal_job_has_the_documented_defaults() {
             Range::Fixed(9.8254e9),
             Range::Fixed(0.4495),
             Range::Free { start: 0.1, lower: 0.02, upper: 0.3 },
-        ],
+        ]),
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo {
             realizations: 2747,
             seed: 1,
@@ -114,7 +116,7 @@ fn a_minimal_job_has_the_documented_defaults() {
             starts: 1,
             first_start: 0,
             sensitivities: true,
-            priors: [None; 7],
+            priors: Search::default().priors,
         },
         posterior: None,
     };

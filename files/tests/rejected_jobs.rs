@@ -8,7 +8,7 @@ mod support;
 
 use std::path::Path;
 
-use osteon_common::job::JobKind;
+use osteon_common::job::{JobKind, JobSpecification};
 use osteon_files::document::Format;
 use osteon_files::job_file;
 
@@ -18,6 +18,10 @@ use support::pin;
 mod objective;
 #[path = "rejected_jobs/posterior.rs"]
 mod posterior;
+#[path = "rejected_jobs/random.rs"]
+mod random;
+#[path = "rejected_jobs/setup_parameters.rs"]
+mod setup_parameters;
 
 const JOB: &str = include_str!("files/job.toml");
 /// The line of the bone in `files/job.toml`.
@@ -43,6 +47,11 @@ fn refusal(text: &str, kind: JobKind) -> String {
         Ok(_) => "ACCEPTED".to_owned(),
         Err(error) => error.to_string(),
     }
+}
+
+fn parsed(text: &str) -> JobSpecification {
+    let base = Path::new("tests/files");
+    job_file::parse(text, Format::Toml, base, JobKind::Identification).unwrap()
 }
 
 fn check(name: &str, kind: JobKind, edits: &[(&str, &str)]) {
@@ -460,7 +469,7 @@ fn all_seven_fixed_leaves_nothing_to_search() {
     }
     assert_eq!(
         refusal(&text, JobKind::Identification),
-        "1 error\n  parameters: all seven are fixed; an identification searches at least \
+        "1 error\n  parameters: all are fixed; an identification searches at least \
          one: give it start and bounds (a run at fixed parameters is a propagation)"
     );
     assert_eq!(refusal(&text, JobKind::Propagation), "ACCEPTED");

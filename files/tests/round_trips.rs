@@ -15,7 +15,9 @@ use osteon_common::job::{
 };
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::moments::Moments;
+use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::probe::{Probe, Receivers, Source};
+use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_files::document::Format;
 use osteon_files::file_error::ContentError;
@@ -193,6 +195,32 @@ fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
     )
 }
 
+fn random() -> impl Strategy<Value = [(Option<f64>, RandomDistribution); 4]> {
+    let distribution = prop::sample::select(RandomDistribution::ALL.to_vec());
+    prop::array::uniform4((prop::option::of(0.001..0.08), distribution))
+}
+
+/// Makes quantities random, each by a share of its mean.
+fn scattered(
+    [thickness, quality, speed, tilt]: [(Option<f64>, RandomDistribution); 4],
+    setup: &Setup,
+) -> RandomQuantities {
+    let scatter = |(share, distribution): (Option<f64>, RandomDistribution), mean: f64| {
+        let share = share.filter(|share| share * mean > 0.0);
+        let deviation =
+            |share: f64| Scatter { standard_deviation: Some(share * mean), distribution };
+        share.map_or_else(Scatter::default, deviation)
+    };
+    let quality_factor = setup.layers.bone_attenuation.quality_factor;
+    RandomQuantities {
+        bone_thickness: scatter(thickness, setup.layers.bone_thickness),
+        // The smallest that is accepted is 2.
+        bone_quality_factor: scatter(quality, quality_factor.map_or(0.0, |mean| mean - 2.0)),
+        coupling_sound_speed: scatter(speed, setup.layers.coupling.sound_speed),
+        probe_tilt: scatter(tilt, setup.probe.tilt),
+    }
+}
+
 fn search() -> impl Strategy<Value = Search> {
     let method = prop::sample::select(SearchMethod::ALL.to_vec());
     let numbers = (positive(), 0.0..1.0, 1e-300..0.5);
@@ -207,22 +235,34 @@ fn search() -> impl Strategy<Value = Search> {
             starts,
             first_start,
             sensitivities,
-            priors: [None; 7],
+            priors: Search::default().priors,
         },
     )
 }
 
 /// Asked for in one of two jobs; the laws of the priors, and their spreads as a share of the start.
-type AskedPosterior = Option<(u64, u64, [(PriorDistribution, f64); 7])>;
+type AskedPosterior = Option<(u64, u64, [(PriorDistribution, f64); PARAMETERS])>;
 
 fn posterior() -> impl Strategy<Value = AskedPosterior> {
     let law = prop::sample::select(PriorDistribution::ALL.to_vec());
-    let laws = prop::array::uniform7((law, 0.01..1.0));
+    let laws = prop::array::uniform10((law, 0.01..1.0));
     prop::option::of((100_u64..=20_000, 20_u64..=2_000, laws))
 }
 
+/// Searches the bone's thickness if `also` says so, from a start that is not the setup's value.
+fn search_thickness(parameters: &mut [Range; PARAMETERS], setup: &Setup, also: bool) {
+    if also {
+        let near = |factor: f64| factor * setup.layers.bone_thickness;
+        parameters[Parameter::BoneThickness as usize] =
+            Range::Free { start: near(1.0005), lower: near(0.999), upper: near(1.001) };
+    }
+}
+
 /// Returns the settings of a posterior whose priors are around the starts.
-fn around_starts(asked: AskedPosterior, parameters: &[Range; 7]) -> Option<PosteriorSettings> {
+fn around_starts(
+    asked: AskedPosterior,
+    parameters: &[Range; PARAMETERS],
+) -> Option<PosteriorSettings> {
     let (draws, max_evaluations, laws) = asked?;
     let prior = |i: usize| match (laws[i], parameters[i]) {
         ((law, share), Range::Free { start, .. }) => {
@@ -246,12 +286,15 @@ fn job() -> impl Strategy<Value = JobSpecification> {
         range(0.02, 0.3),
     );
     let objective = prop::sample::select(Objective::ALL.to_vec());
-    let settings = (monte_carlo(), search(), objective, posterior());
+    let settings = (random(), monte_carlo(), search(), objective, posterior());
     (any::<bool>(), setup(), data(), parameters, settings).prop_map(
         |(identification, setup, data, parameters, settings)| {
-            let (monte_carlo, mut search, objective, posterior) = settings;
+            let (random, monte_carlo, mut search, objective, posterior) = settings;
+            let random = scattered(random, &setup);
             let (rho, e_l, nu_l, g_l, e_t, nu_t, delta) = parameters;
-            let parameters = [rho, e_l, nu_l, g_l, e_t, nu_t, delta];
+            let mut parameters = Range::of_bone([rho, e_l, nu_l, g_l, e_t, nu_t, delta]);
+            let also = rho.start().to_bits().is_multiple_of(2);
+            search_thickness(&mut parameters, &setup, also);
             let by_simplex = search.method == SearchMethod::Simplex;
             for (prior, range) in search.priors.iter_mut().zip(parameters) {
                 // Of some that are free.
@@ -273,6 +316,7 @@ fn job() -> impl Strategy<Value = JobSpecification> {
                 setup,
                 data: identification.then_some(data),
                 parameters,
+                random,
                 monte_carlo,
                 objective,
                 search,
@@ -291,7 +335,7 @@ fn change_prior(job: &mut JobSpecification, prior: PosteriorPrior) {
     job.posterior.get_or_insert_default().priors[6] = prior;
 }
 
-const EDITS: [Edit; 18] = [
+const EDITS: [Edit; 20] = [
     |job, x| job.setup.layers.coupling.thickness = x,
     |job, x| job.setup.layers.bone_thickness = x,
     |job, x| job.setup.layers.marrow.sound_speed = x,
@@ -304,6 +348,8 @@ const EDITS: [Edit; 18] = [
     |job, x| job.setup.solver.refinement = x,
     |job, x| job.parameters[5] = Range::Fixed(x),
     |job, x| job.parameters[6] = Range::Free { start: x, lower: 0.1, upper: x },
+    |job, x| job.random.bone_thickness.standard_deviation = Some(x),
+    |job, x| job.random.probe_tilt.standard_deviation = Some(x),
     |job, x| job.search.initial_step = x,
     |job, x| job.data = Some(Data::from_velocities(vec![x, 1.0])),
     |job, x| job.monte_carlo.scrambles = x as u64,

@@ -10,10 +10,6 @@ use osteon_common::warnings::{Warning, case_warnings, job_warnings};
 use osteon_files::document::Format;
 use osteon_files::{case_file, job_file};
 
-/// The line of the bone in `files/job.toml`.
-const BONE: &str = "bone     = { thickness = 3e-3, attenuation = { quality_factor = 15.0, \
-                    reference_frequency = 0.8e6 } }";
-
 const JOB: &str = include_str!("files/job.toml");
 const CASE: &str = include_str!("files/case.toml");
 const MANDEL: &str = include_str!("files/mandel.toml");
@@ -48,8 +44,8 @@ fn unusual_numbers_of_a_job_are_accepted_with_a_warning() {
     let given = "velocities = [3900.5, 4000, 3950.25]";
     for (from, to, expected) in [
         (
-            BONE,
-            "bone = { thickness = 0.4 }",
+            "thickness = 3e-3",
+            "thickness = 0.4",
             "layers.bone.thickness: is 0.4 m; usual is 0.0002 to 0.03 m; did you mean 0.4 mm (0.4e-3)?",
         ),
         (

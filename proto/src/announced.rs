@@ -68,6 +68,7 @@ mod tests {
     use osteon_common::case::Setup;
     use osteon_common::germ_source::GermSource;
     use osteon_common::parameters::Point;
+    use osteon_common::random_quantities::RandomQuantities;
     use osteon_fuzz::properties;
     use proptest::prelude::*;
 
@@ -76,7 +77,13 @@ mod tests {
 
     fn evaluation(id: u64) -> EvaluationInput {
         let germs = GermSource::streams(id);
-        EvaluationInput { id, setup: Setup::default(), point: Point([1.0; 7]), germs }
+        EvaluationInput {
+            id,
+            setup: Setup::default(),
+            point: Point::of_bone([1.0; 7]),
+            germs,
+            random: RandomQuantities::default(),
+        }
     }
 
     properties! {

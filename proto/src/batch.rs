@@ -86,6 +86,7 @@ mod tests {
     use osteon_common::germ_source::GermSource;
     use osteon_common::outcome::FailureKind;
     use osteon_common::parameters::Point;
+    use osteon_common::random_quantities::RandomQuantities;
     use osteon_fuzz::properties;
     use proptest::prelude::*;
 
@@ -96,7 +97,8 @@ mod tests {
         evaluation::to_message(&EvaluationInput {
             id,
             setup: Setup::default(),
-            point: Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
+            point: Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
+            random: RandomQuantities::default(),
             germs: GermSource::streams(1),
         })
     }

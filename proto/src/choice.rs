@@ -98,7 +98,7 @@ pub static PRIOR_DISTRIBUTION: EnumMapping<PriorDistribution, v1::PriorDistribut
         name: v1::PriorDistribution::as_str_name,
     };
 
-/// One of the seven parameters.
+/// One of the parameters.
 pub static PARAMETER: EnumMapping<Parameter, v1::Parameter> = EnumMapping {
     all: &Parameter::ALL,
     message: |parameter| match parameter {
@@ -109,6 +109,9 @@ pub static PARAMETER: EnumMapping<Parameter, v1::Parameter> = EnumMapping {
         Parameter::TransverseYoungModulus => v1::Parameter::TransverseYoungModulus,
         Parameter::TransversePoissonRatio => v1::Parameter::TransversePoissonRatio,
         Parameter::Dispersion => v1::Parameter::Dispersion,
+        Parameter::BoneThickness => v1::Parameter::BoneThickness,
+        Parameter::BoneQualityFactor => v1::Parameter::BoneQualityFactor,
+        Parameter::CouplingSoundSpeed => v1::Parameter::CouplingSoundSpeed,
     },
     name: v1::Parameter::as_str_name,
 };

@@ -4,7 +4,7 @@ use osteon_common::inference::{
     Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors, Profile, Sensitivity,
     Solution, Solutions, Spread, Spreads, Uncertainty,
 };
-use osteon_common::parameters::Parameter;
+use osteon_common::parameters::{BONE_PARAMETERS, Parameter};
 use osteon_common::posterior::PosteriorDraw;
 
 use crate::choice::PARAMETER;
@@ -219,9 +219,9 @@ fn solutions_to_message(solutions: &Solutions) -> v1::Solutions {
         cost: Some(one.cost),
         evaluations: one.evaluations,
     };
-    let parameters = spread.iter().flat_map(|spread| Parameter::ALL.iter().zip(&spread.parameters));
-    let parameters = parameters.map(|(&parameter, spread)| v1::ParameterSpread {
-        parameter: PARAMETER.number(parameter),
+    let parameters = spread.iter().flat_map(|spread| &spread.parameters);
+    let parameters = parameters.map(|(parameter, spread)| v1::ParameterSpread {
+        parameter: PARAMETER.number(*parameter),
         spread: Some(spread_to_message(spread)),
     });
     let entries = spread.iter().flat_map(|spread| &spread.entries);
@@ -259,17 +259,14 @@ fn spreads_from_message(message: &v1::Solutions) -> Result<Spreads, Malformed> {
     let spread = |one: &v1::ParameterSpread| {
         Ok((parameter(one.parameter)?, spread_from_message(one.spread.as_ref())?))
     };
-    let found = message.parameters.iter().map(spread).collect::<Result<Vec<_>, Malformed>>()?;
-    if !found.iter().map(|(parameter, _)| *parameter).eq(Parameter::ALL) {
-        let (field, found) = ("parameters", found.len());
-        return Err(Malformed::WrongLength { field, found, expected: Parameter::ALL.len() });
+    let parameters =
+        message.parameters.iter().map(spread).collect::<Result<Vec<_>, Malformed>>()?;
+    let names = parameters.iter().map(|(parameter, _)| *parameter);
+    let is_complete = names.clone().take(BONE_PARAMETERS).eq(Parameter::OF_BONE);
+    if !is_complete || !names.is_sorted_by(|one, next| one < next) {
+        let (field, found) = ("parameters", parameters.len());
+        return Err(Malformed::WrongLength { field, found, expected: BONE_PARAMETERS });
     }
-    let spreads: Vec<Spread> = found.into_iter().map(|(_, spread)| spread).collect();
-    let parameters = spreads.try_into().map_err(|spreads: Vec<Spread>| Malformed::WrongLength {
-        field: "parameters",
-        found: spreads.len(),
-        expected: Parameter::ALL.len(),
-    })?;
     let entry = |one: &v1::EntrySpread| {
         let row = place(one.row, 1, "row")?;
         Ok((row, place(one.column, one.row, "column")?, spread_from_message(one.spread.as_ref())?))

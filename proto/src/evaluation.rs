@@ -6,12 +6,13 @@ use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::job::Sampling;
 use osteon_common::limits::{REALIZATIONS_MAX, SEED_MAX};
 use osteon_common::parameters::Point;
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::violations::Violations;
 
 use crate::choice::SAMPLING;
 use crate::malformed::Malformed;
 use crate::parameter_values::{point_from_message, point_to_message};
-use crate::setup::{self, SetupMessages};
+use crate::setup::{self, SetupMessages, random_from_message, random_to_message};
 use crate::v1;
 
 /// The part that all batches of one evaluation have in common. With it, an index determines a
@@ -26,6 +27,8 @@ pub struct EvaluationInput {
     pub point: Point,
     /// Source of the germs.
     pub germs: GermSource,
+    /// Scatter of quantities of the setup.
+    pub random: RandomQuantities,
 }
 
 /// Returns the message of an evaluation.
@@ -45,6 +48,7 @@ pub fn to_message(evaluation: &EvaluationInput) -> v1::Evaluation {
         seed: evaluation.germs.seed,
         sampling: SAMPLING.number(sampling),
         points_per_scramble: points,
+        random: random_to_message(&evaluation.random),
     }
 }
 
@@ -60,11 +64,16 @@ pub fn from_message(message: &v1::Evaluation) -> Result<EvaluationInput, Malform
     }
     let mut violations = Violations::new();
     let setup = read_setup(message, &mut violations)?;
+    let point = point_from_message(message.point.as_ref())?;
+    let at_point = point.setup(&setup);
+    if at_point != setup {
+        check::setup(&at_point, &mut violations);
+    }
+    let random = read_random(message, &at_point, &mut violations)?;
     let sampling = SAMPLING.required(message.sampling, "sampling")?;
     violations.into_result(()).map_err(Malformed::InvalidSetup)?;
     let germs = GermSource { seed: message.seed, scheme: scheme(message, sampling)? };
-    let point = point_from_message(message.point.as_ref())?;
-    Ok(EvaluationInput { id: message.evaluation, setup, point, germs })
+    Ok(EvaluationInput { id: message.evaluation, setup, point, germs, random })
 }
 
 /// Returns the scheme by which germs are generated from the seed.
@@ -107,6 +116,19 @@ fn read_setup(message: &v1::Evaluation, violations: &mut Violations) -> Result<S
     if complete { Ok(setup) } else { Err(Malformed::IncompleteSetup) }
 }
 
+/// Reads and checks the random quantities, which must be complete.
+fn read_random(
+    message: &v1::Evaluation,
+    setup: &Setup,
+    violations: &mut Violations,
+) -> Result<RandomQuantities, Malformed> {
+    let Some(message) = &message.random else { return Ok(RandomQuantities::default()) };
+    let random = random_from_message(message, violations);
+    check::random_quantities(&random, setup, violations);
+    let complete = !violations.is_empty() || random_to_message(&random).as_ref() == Some(message);
+    if complete { Ok(random) } else { Err(Malformed::IncompleteSetup) }
+}
+
 #[cfg(test)]
 mod tests {
     use osteon_fuzz::properties;
@@ -117,7 +139,8 @@ mod tests {
     const EVALUATION: fn(u64, f64, u64) -> EvaluationInput = |id, density, seed| EvaluationInput {
         id,
         setup: Setup::default(),
-        point: Point([density, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
+        point: Point::of_bone([density, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
+        random: RandomQuantities::default(),
         germs: GermSource::streams(seed),
     };
 
@@ -128,9 +151,11 @@ mod tests {
             thickness in 1e-3..8e-3,
             seed in 0..=SEED_MAX,
             points in proptest::option::of(1..=REALIZATIONS_MAX),
+            deviation in proptest::option::of(1e-6..1e-4),
         ) {
             let mut evaluation = EVALUATION(id, density, seed);
             evaluation.setup.layers.bone_thickness = thickness;
+            evaluation.random.bone_thickness.standard_deviation = deviation;
             if let Some(points) = points {
                 evaluation.germs.scheme = GermScheme::Sobol { points };
             }
@@ -172,6 +197,19 @@ mod tests {
             message.layers.as_mut().unwrap().coupling.as_mut().unwrap().density = Some(-1.0);
         };
         assert!(matches!(refused(negative), Malformed::InvalidSetup(_)));
+        let scatter = |standard_deviation, distribution| {
+            refused(|message| {
+                let bone_thickness = Some(v1::Scatter { standard_deviation, distribution });
+                message.random = Some(v1::RandomQuantities {
+                    bone_thickness,
+                    ..v1::RandomQuantities::default()
+                });
+            })
+        };
+        let normal = v1::RandomDistribution::Normal.into();
+        assert_eq!(scatter(Some(1e-4), 0), Malformed::IncompleteSetup);
+        assert!(matches!(scatter(None, normal), Malformed::InvalidSetup(_)));
+        assert!(matches!(scatter(Some(1e-3), normal), Malformed::InvalidSetup(_)));
     }
 
     #[test]
@@ -197,5 +235,10 @@ mod tests {
             |dispersion| refused(|message| message.point.as_mut().unwrap().dispersion = dispersion);
         assert_eq!(field(of_point(None)), "dispersion");
         assert_eq!(field(of_point(Some(f64::NAN))), "dispersion");
+        let searched = |factor| {
+            refused(|message| message.point.as_mut().unwrap().bone_quality_factor = factor)
+        };
+        assert!(matches!(searched(Some(1.5)), Malformed::InvalidSetup(_)));
+        assert_eq!(field(searched(Some(-1.0))), "bone_quality_factor");
     }
 }

@@ -1,6 +1,6 @@
 //! A number for each parameter as a message.
 
-use osteon_common::parameters::{Parameter, Point};
+use osteon_common::parameters::{AS_IN_SETUP, PARAMETERS, Parameter, Point};
 
 use crate::malformed::Malformed;
 use crate::v1;
@@ -15,7 +15,10 @@ pub fn point_to_message(point: &Point) -> v1::ParameterValues {
         transverse_young_modulus,
         transverse_poisson_ratio,
         dispersion,
+        of_setup @ ..,
     ] = point.0.map(Some);
+    let searched = |value: Option<f64>| value.filter(|value| *value != AS_IN_SETUP);
+    let [bone_thickness, bone_quality_factor, coupling_sound_speed] = of_setup.map(searched);
     v1::ParameterValues {
         density,
         longitudinal_young_modulus,
@@ -24,23 +27,35 @@ pub fn point_to_message(point: &Point) -> v1::ParameterValues {
         transverse_young_modulus,
         transverse_poisson_ratio,
         dispersion,
+        bone_thickness,
+        bone_quality_factor,
+        coupling_sound_speed,
     }
 }
 
 /// Returns the point of a message.
 ///
 /// # Errors
-/// If the message or one of the seven numbers is absent, or if one is not finite.
+/// If the message or a number of the bone is absent, if one is not finite, or if one of the setup is
+/// not above 0.
 pub fn point_from_message(message: Option<&v1::ParameterValues>) -> Result<Point, Malformed> {
     let message = message.ok_or(Malformed::Missing { field: "point" })?;
-    let mut point = Point([0.0; 7]);
+    let mut point = Point([AS_IN_SETUP; PARAMETERS]);
     for (slot, parameter) in point.0.iter_mut().zip(Parameter::ALL) {
-        let field = parameter.name();
-        *slot = get(message, parameter).ok_or(Malformed::Missing { field })?;
-        if !slot.is_finite() {
-            let allowed = "every number of a point must be finite";
-            return Err(Malformed::OutOfRange { field, value: *slot, allowed });
+        let (field, of_setup) = (parameter.name(), parameter.of_setup().is_some());
+        let value = match get(message, parameter) {
+            Some(value) => value,
+            None if of_setup => continue,
+            None => return Err(Malformed::Missing { field }),
+        };
+        if !value.is_finite() || (of_setup && value <= 0.0) {
+            let allowed = match of_setup {
+                true => "it must be finite and above 0",
+                false => "every number of a point must be finite",
+            };
+            return Err(Malformed::OutOfRange { field, value, allowed });
         }
+        *slot = value;
     }
     Ok(point)
 }
@@ -82,6 +97,9 @@ fn slot(message: &mut v1::ParameterValues, parameter: Parameter) -> &mut Option<
         Parameter::TransverseYoungModulus => &mut message.transverse_young_modulus,
         Parameter::TransversePoissonRatio => &mut message.transverse_poisson_ratio,
         Parameter::Dispersion => &mut message.dispersion,
+        Parameter::BoneThickness => &mut message.bone_thickness,
+        Parameter::BoneQualityFactor => &mut message.bone_quality_factor,
+        Parameter::CouplingSoundSpeed => &mut message.coupling_sound_speed,
     }
 }
 
@@ -90,21 +108,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_point_has_all_seven_and_they_are_finite() {
+    fn a_point_has_all_of_the_bone_and_they_are_finite() {
         // The sign of zero is kept, too.
-        let point = Point([1598.8, 17.717e9, -0.0, 4.795e9, 9.8254e9, 0.0, 0.1029]);
+        let mut point = Point::of_bone([1598.8, 17.717e9, -0.0, 4.795e9, 9.8254e9, 0.0, 0.1029]);
+        point.0[Parameter::BoneThickness as usize] = 3e-3;
         let message = point_to_message(&point);
         assert_eq!((message.density, message.dispersion), (Some(1598.8), Some(0.1029)));
+        assert_eq!((message.bone_thickness, message.coupling_sound_speed), (Some(3e-3), None));
         let read = point_from_message(Some(&message)).unwrap();
         assert_eq!(read.0.map(f64::to_bits), point.0.map(f64::to_bits));
         for parameter in Parameter::ALL {
             let field = parameter.name();
-            let mut missing = message;
-            *slot(&mut missing, parameter) = None;
-            assert_eq!(point_from_message(Some(&missing)), Err(Malformed::Missing { field }));
-            *slot(&mut missing, parameter) = Some(f64::INFINITY);
-            let refused = point_from_message(Some(&missing)).unwrap_err();
-            assert!(matches!(refused, Malformed::OutOfRange { field: at, .. } if at == field));
+            let of_setup = parameter.of_setup().is_some();
+            let mut changed = message;
+            *slot(&mut changed, parameter) = None;
+            let missing = Err(Malformed::Missing { field });
+            let found = point_from_message(Some(&changed));
+            assert!(if of_setup { found.is_ok() } else { found == missing }, "{found:?}");
+            let refused = if of_setup { 0.0 } else { f64::NAN };
+            for value in [f64::INFINITY, refused] {
+                *slot(&mut changed, parameter) = Some(value);
+                let found = point_from_message(Some(&changed)).unwrap_err();
+                assert!(matches!(found, Malformed::OutOfRange { field: at, .. } if at == field));
+            }
         }
         assert_eq!(point_from_message(None), Err(Malformed::Missing { field: "point" }));
     }

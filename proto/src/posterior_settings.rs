@@ -1,7 +1,7 @@
 //! The settings of a posterior as a message.
 
 use osteon_common::job::{PosteriorPrior, PosteriorSettings, PriorDistribution};
-use osteon_common::parameters::Parameter;
+use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::violations::Violations;
 
 use crate::choice::{PARAMETER, PRIOR_DISTRIBUTION};
@@ -32,7 +32,7 @@ pub(crate) fn from_message(
 ) -> PosteriorSettings {
     let mut settings = PosteriorSettings::default();
     fields::from_message(PosteriorSettings::KEY.name, message, &mut settings, violations);
-    let mut given = [false; 7];
+    let mut given = [false; PARAMETERS];
     for prior in &message.priors {
         let Some(parameter) = PARAMETER.value(prior.parameter) else {
             let refusal = PARAMETER.refusal(prior.parameter);

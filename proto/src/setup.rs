@@ -4,6 +4,7 @@
 //! only the fields that differ from it.
 
 use osteon_common::case::Setup;
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::settings::{Picking, SolverSettings};
 use osteon_common::violations::Violations;
 
@@ -54,6 +55,22 @@ pub fn from_messages(
         picking.map_or(setup.picking, |message| picking_from_message(message, violations));
     setup.solver = solver.map_or(setup.solver, |message| solver_from_message(message, violations));
     setup
+}
+
+/// Returns random quantities as a message; `None` if nothing is random.
+pub(crate) fn random_to_message(random: &RandomQuantities) -> Option<v1::RandomQuantities> {
+    random.is_any().then(|| fields::to_message(&mut random.clone()))
+}
+
+/// Returns the random quantities of a message; an unknown distribution, and one without a standard
+/// deviation, are added to `violations`.
+pub(crate) fn random_from_message(
+    message: &v1::RandomQuantities,
+    violations: &mut Violations,
+) -> RandomQuantities {
+    let mut random = RandomQuantities::default();
+    fields::from_message("random", message, &mut random, violations);
+    random
 }
 
 /// Returns picking settings as a complete message.

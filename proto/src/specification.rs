@@ -6,13 +6,15 @@ use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, Omitted, Prior,
     Range, Search,
 };
-use osteon_common::parameters::Parameter;
+use osteon_common::parameters::{PARAMETERS, Parameter};
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::violations::Violations;
 
 use crate::choice::{JOB_KIND, PARAMETER};
 use crate::fields;
 use crate::posterior_settings;
 use crate::setup;
+use crate::setup::{random_from_message, random_to_message};
 use crate::v1;
 
 /// Returns the complete message of a specification: every field is present.
@@ -26,6 +28,7 @@ pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
         solver: Some(messages.solver),
         data: specification.data.as_ref().map(data_to_message),
         parameters: Some(parameters_to_message(&specification.parameters)),
+        random: random_to_message(&specification.random),
         monte_carlo: Some(fields::to_message(&mut specification.monte_carlo.clone())),
         objective: Some(fields::to_message(&mut specification.objective.clone())),
         search: Some(search_to_message(&specification.search)),
@@ -63,6 +66,9 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
         JobKind::Identification
     });
     let (mut monte_carlo, mut objective) = (MonteCarlo::default(), Objective::default());
+    let random = message.random.as_ref();
+    let random = random
+        .map_or_else(RandomQuantities::default, |message| random_from_message(message, violations));
     if let Some(message) = &message.monte_carlo {
         fields::from_message("monte_carlo", message, &mut monte_carlo, violations);
     }
@@ -80,6 +86,7 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
         ),
         data: message.data.as_ref().and_then(|data| data_from_message(data, violations)),
         parameters: parameters_from_message(message.parameters.as_ref(), violations),
+        random,
         monte_carlo,
         objective,
         search: message
@@ -178,9 +185,10 @@ fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measu
     }
 }
 
-fn parameters_to_message(ranges: &[Range; 7]) -> v1::Parameters {
+fn parameters_to_message(ranges: &[Range; PARAMETERS]) -> v1::Parameters {
     let message = |parameter: Parameter| {
         let range = match ranges[parameter as usize] {
+            Range::AS_IN_SETUP if parameter.of_setup().is_some() => return None,
             Range::Fixed(value) => v1::parameter_range::Range::Fixed(value),
             Range::Free { start, lower, upper } => {
                 v1::parameter_range::Range::Free(v1::FreeRange { start, lower, upper })
@@ -196,13 +204,16 @@ fn parameters_to_message(ranges: &[Range; 7]) -> v1::Parameters {
         transverse_young_modulus: message(Parameter::TransverseYoungModulus),
         transverse_poisson_ratio: message(Parameter::TransversePoissonRatio),
         dispersion: message(Parameter::Dispersion),
+        bone_thickness: message(Parameter::BoneThickness),
+        bone_quality_factor: message(Parameter::BoneQualityFactor),
+        coupling_sound_speed: message(Parameter::CouplingSoundSpeed),
     }
 }
 
 fn parameters_from_message(
     message: Option<&v1::Parameters>,
     violations: &mut Violations,
-) -> [Range; 7] {
+) -> [Range; PARAMETERS] {
     Parameter::ALL.map(|parameter| {
         let range = message.and_then(|message| parameter_message(message, parameter));
         match range.and_then(|range| range.range.as_ref()) {
@@ -210,6 +221,7 @@ fn parameters_from_message(
             Some(v1::parameter_range::Range::Free(free)) => {
                 Range::Free { start: free.start, lower: free.lower, upper: free.upper }
             }
+            None if range.is_none() && parameter.of_setup().is_some() => Range::AS_IN_SETUP,
             None => {
                 violations.add(
                     format!("parameters.{}", parameter.name()),
@@ -233,6 +245,9 @@ fn parameter_message(
         Parameter::TransverseYoungModulus => message.transverse_young_modulus.as_ref(),
         Parameter::TransversePoissonRatio => message.transverse_poisson_ratio.as_ref(),
         Parameter::Dispersion => message.dispersion.as_ref(),
+        Parameter::BoneThickness => message.bone_thickness.as_ref(),
+        Parameter::BoneQualityFactor => message.bone_quality_factor.as_ref(),
+        Parameter::CouplingSoundSpeed => message.coupling_sound_speed.as_ref(),
     }
 }
 
@@ -250,7 +265,7 @@ pub(crate) fn search_from_message(message: &v1::Search, violations: &mut Violati
     search
 }
 
-fn priors_to_message(priors: &[Option<Prior>; 7]) -> Vec<v1::Prior> {
+fn priors_to_message(priors: &[Option<Prior>; PARAMETERS]) -> Vec<v1::Prior> {
     let message = |(parameter, prior): (&Parameter, &Option<Prior>)| {
         let Prior { value, weight } = (*prior)?;
         Some(v1::Prior { parameter: PARAMETER.number(*parameter), value, weight })
@@ -258,8 +273,11 @@ fn priors_to_message(priors: &[Option<Prior>; 7]) -> Vec<v1::Prior> {
     Parameter::ALL.iter().zip(priors).filter_map(message).collect()
 }
 
-fn priors_from_message(messages: &[v1::Prior], violations: &mut Violations) -> [Option<Prior>; 7] {
-    let mut priors = [None; 7];
+fn priors_from_message(
+    messages: &[v1::Prior],
+    violations: &mut Violations,
+) -> [Option<Prior>; PARAMETERS] {
+    let mut priors = [None; PARAMETERS];
     for &v1::Prior { parameter, value, weight } in messages {
         let Some(known) = PARAMETER.value(parameter) else {
             violations

@@ -77,7 +77,7 @@ fn check_specification(bytes: &[u8]) {
 /// The evaluation at the start of a job.
 fn evaluation_of(job: &JobSpecification) -> evaluation::EvaluationInput {
     let (setup, point, germs) = (job.setup, job.start(), job.monte_carlo.germs());
-    evaluation::EvaluationInput { id: 7, setup, point, germs }
+    evaluation::EvaluationInput { id: 7, setup, point, germs, random: job.random }
 }
 
 fn evaluations() -> Vec<Vec<u8>> {
@@ -148,7 +148,7 @@ fn check_answer(bytes: &[u8]) {
     }
 }
 
-const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const POINT: Point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
 fn row(number: u64) -> v1::EvaluationRow {
     let failures =
@@ -169,7 +169,7 @@ fn row(number: u64) -> v1::EvaluationRow {
 /// A job of two free parameters with two starts.
 fn job_of_two_starts() -> JobSpecification {
     let text = "[data]\nvelocities = [3900.0, 3950.0, 4000.0, 3909.2, 3990.8]\n[search]\nstarts = 2\n[parameters]\n";
-    let ranges = Parameter::ALL.map(|parameter| {
+    let ranges = Parameter::OF_BONE.map(|parameter| {
         let (name, value) = (parameter.name(), POINT.get(parameter));
         match parameter {
             Parameter::Density => {

@@ -46,7 +46,7 @@ pub enum IdentifyError<E> {
     #[error("the specification is not acceptable:\n{0}")]
     Specification(Violations),
     /// The caller could not compute the realizations of a point.
-    #[error("the realizations of evaluation {number} at {at:?} were not computed: {cause:#}", at = .point.0)]
+    #[error("the realizations of evaluation {number} at {point} were not computed: {cause:#}")]
     Evaluation {
         /// Number of the evaluation.
         number: u64,
@@ -96,9 +96,10 @@ pub enum IdentifyError<E> {
 /// use osteon_common::case::Setup;
 /// use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 /// use osteon_common::outcome::RealizationResult;
+/// use osteon_common::random_quantities::RandomQuantities;
 /// use osteon_common::results::Status;
 ///
-/// let mut parameters = [1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
+/// let mut parameters = Range::of_bone([1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed));
 /// parameters[1] = Range::Free { start: 15e9, lower: 12e9, upper: 25e9 };
 /// parameters[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
 /// let specification = JobSpecification {
@@ -106,6 +107,7 @@ pub enum IdentifyError<E> {
 ///     setup: Setup::default(),
 ///     data: Some(Data::from_moments(3900.0, 0.03)),
 ///     parameters,
+///     random: RandomQuantities::default(),
 ///     monte_carlo: MonteCarlo { realizations: 100, ..MonteCarlo::default() },
 ///     objective: Objective::Moments,
 ///     search: Search::default(),
@@ -163,7 +165,7 @@ fn solve<E>(
     evaluate: &mut impl FnMut(&Realizations) -> Result<Vec<RealizationResult>, E>,
 ) -> Result<Vec<RealizationResult>, IdentifyError<E>> {
     let count = specification.monte_carlo.realizations;
-    let Ok(ensemble) = Ensemble::drawn(&point, specification.monte_carlo.germs()) else {
+    let Ok(ensemble) = specification.ensemble(&point) else {
         return Ok((0..count).map(|_| RealizationResult::failed(FailureKind::NotFinite)).collect());
     };
     let solved = evaluate(&Realizations { point, ensemble, count })

@@ -115,6 +115,9 @@ enum SlopeRefresh {
 pub struct Newton {
     settings: Settings,
     target: Logarithms,
+    /// The first axis of a parameter of the setup, which all come last. The closed form does not contain
+    /// them, so their slopes are always measured.
+    first_of_setup: usize,
     /// Point from which distances are measured: the start, later a point near the solution.
     centre: Vec<f64>,
     /// Whether `centre` is near the solution.
@@ -150,6 +153,7 @@ impl Newton {
         let mut newton = Self {
             settings,
             target: logarithms(data),
+            first_of_setup: space.first_of_setup(),
             model: Model::new(space, start.clone(), rule),
             weights: None,
             base: None,
@@ -286,6 +290,7 @@ impl Newton {
         } else {
             self.slow_evaluations += 1;
         }
+        let is_first = lowest.is_none();
         if lowest.is_none_or(|lowest| trial.cost < lowest) {
             self.model.make_exact_at(&trial.at, trial.found);
             if self.full_step && self.is_near(&trial) {
@@ -296,6 +301,10 @@ impl Newton {
             self.radius = (2.0 * self.radius).min(RADIUS_MAX);
         } else {
             self.radius = 0.5 * length;
+        }
+        if is_first && self.first_of_setup < self.centre.len() {
+            self.measure_from(self.first_of_setup);
+            return;
         }
         self.next_step(!halved && length <= self.settings.size_tolerance);
     }
@@ -365,7 +374,9 @@ impl Newton {
         }
         self.radius = RADIUS_MAX;
         self.slow_evaluations = 0;
-        if self.slope_refresh == SlopeRefresh::None && self.model.reset_slopes() {
+        let all_in_closed_form = self.first_of_setup == self.centre.len();
+        let may_reset = all_in_closed_form && self.slope_refresh == SlopeRefresh::None;
+        if may_reset && self.model.reset_slopes() {
             self.slope_refresh = SlopeRefresh::Reset;
             return true;
         }

@@ -80,16 +80,17 @@ pub struct Summary {
 /// A stored evaluation belongs to a different search.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "stored evaluation {number} is at {found:?}, but the search goes to {expected:?}: \
-     the store was written by another version of osteon; submit the job again"
+    "stored evaluation {number} is at {found}, but the search {}: the store was written by another \
+     version of osteon; submit the job again",
+    .expected.as_ref().map_or_else(|| "has ended".to_owned(), |point| format!("goes to {point}"))
 )]
 pub struct ReplayError {
     /// Number of the evaluation.
     pub number: u64,
     /// The stored point.
-    pub found: Box<[f64; 7]>,
+    pub found: Box<Point>,
     /// The point that this search asks for; `None` if it has ended.
-    pub expected: Option<Box<[f64; 7]>>,
+    pub expected: Option<Box<Point>>,
 }
 
 #[derive(Debug, Clone)]
@@ -164,17 +165,16 @@ impl Search {
     /// # Errors
     /// If the search asks for a different point, or for none.
     pub fn expects(&self, point: Point) -> Result<(), ReplayError> {
-        let found = point.0;
         let expected = match self.ask() {
-            Step::Evaluate(point) => Some(point.0),
+            Step::Evaluate(point) => Some(point),
             Step::Done(_) => None,
         };
-        if expected.map(|at| at.map(f64::to_bits)) == Some(found.map(f64::to_bits)) {
+        if expected.map(|at| at.0.map(f64::to_bits)) == Some(point.0.map(f64::to_bits)) {
             return Ok(());
         }
         Err(ReplayError {
             number: self.evaluations(),
-            found: found.into(),
+            found: Box::new(point),
             expected: expected.map(Box::new),
         })
     }

@@ -3,12 +3,12 @@
 
 use osteon_common::ensemble::DISPERSION_MAX;
 use osteon_common::job::{ON_BOUND, Range};
-use osteon_common::parameters::{Parameter, Point};
+use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Parameter, Point};
 
 /// The ranges within which a search moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchBox {
-    ranges: [Range; 7],
+    ranges: [Range; PARAMETERS],
 }
 
 /// The bound of a parameter on which a point lies.
@@ -23,13 +23,20 @@ pub enum Side {
 impl SearchBox {
     /// Creates the box of these ranges, which are in the order of [`Parameter::ALL`] and have been
     /// checked.
-    pub fn new(ranges: [Range; 7]) -> Self {
+    pub fn new(ranges: [Range; PARAMETERS]) -> Self {
         Self { ranges }
     }
 
     /// Returns the coordinates of the start.
     pub fn start(&self) -> Vec<f64> {
         self.ranges.iter().filter_map(unit_start).collect()
+    }
+
+    /// Returns the first coordinate of a parameter of the setup; the number of coordinates if there is
+    /// none.
+    pub fn first_of_setup(&self) -> usize {
+        let of_bone = self.ranges.iter().take(BONE_PARAMETERS);
+        of_bone.filter(|range| matches!(range, Range::Free { .. })).count()
     }
 
     /// Returns the box with its start at these coordinates; surplus coordinates are ignored.
@@ -66,7 +73,7 @@ impl SearchBox {
 
     /// Converts derivatives with respect to [`Parameter::ALL`] to derivatives with respect to the
     /// coordinates.
-    pub fn per_edge(&self, gradient: &[f64; 7]) -> Vec<f64> {
+    pub fn per_edge(&self, gradient: &[f64; PARAMETERS]) -> Vec<f64> {
         let of = |(range, slope): (&Range, &f64)| match range {
             Range::Fixed(_) => None,
             Range::Free { .. } => Some(slope * range.edge()),
@@ -107,7 +114,8 @@ mod tests {
     use super::*;
 
     fn example() -> SearchBox {
-        let mut ranges = [1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
+        let mut ranges =
+            Range::of_bone([1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed));
         ranges[1] = Range::Free { start: 15.2e9, lower: 12e9, upper: 25e9 };
         ranges[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
         SearchBox::new(ranges)
@@ -124,7 +132,7 @@ mod tests {
 
     #[test]
     fn slopes_are_those_along_an_edge() {
-        let slopes = example().per_edge(&[9.0, 1e-9, 9.0, 9.0, 9.0, 9.0, 2.0]);
+        let slopes = example().per_edge(&[9.0, 1e-9, 9.0, 9.0, 9.0, 9.0, 2.0, 9.0, 9.0, 9.0]);
         assert!((slopes[0] - 13.0).abs() < 1e-12 && (slopes[1] - 0.56).abs() < 1e-12);
         assert_eq!(slopes.len(), 2);
     }

@@ -71,16 +71,17 @@ const OFF_LINE: (f64, f64) = (0.02, 0.03);
 /// Picks of two passes that differ by more than this, in periods, belong to different extrema.
 const SAME_EXTREMUM: f64 = 0.05;
 
-/// The exact method for one setup, with the tables that all its realizations share.
-#[derive(Debug)]
+/// The exact method for one setup, with the tables that all its realizations share. Clones share
+/// them.
+#[derive(Debug, Clone)]
 pub(crate) struct Exact {
     setup: Setup,
     /// Distances of the receivers along the probe, m.
     distances: Vec<f64>,
     places: Vec<Place>,
     isa: Isa,
-    without_faces: GradeCaches,
-    with_faces: GradeCaches,
+    without_faces: Arc<GradeCaches>,
+    with_faces: Arc<GradeCaches>,
 }
 
 /// The tables of every grade.
@@ -100,9 +101,14 @@ impl Exact {
             distances: setup.probe.distances().collect(),
             places: setup.probe.places().collect(),
             isa,
-            without_faces: GradeCaches::new(setup, OuterFaces::None, memory),
-            with_faces: GradeCaches::new(setup, OuterFaces::Audible, memory),
+            without_faces: Arc::new(GradeCaches::new(setup, OuterFaces::None, memory)),
+            with_faces: Arc::new(GradeCaches::new(setup, OuterFaces::Audible, memory)),
         }
+    }
+
+    /// Returns the method for a setup that has the same tables ([`has_tables_of`]), and shares them.
+    pub(crate) fn sharing(&self, setup: &Setup) -> Self {
+        Self { setup: *setup, ..self.clone() }
     }
 
     pub(crate) fn arrival(
@@ -278,6 +284,14 @@ fn too_large(speed: f64) -> Failure {
 /// Returns 0 up to `from`, 1 from `to` on, and linear values between.
 fn rise(value: f64, (from, to): (f64, f64)) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
+}
+
+/// Returns whether two setups have the same tables: they describe coupling, marrow, probe and
+/// sampling, and depend on the bone's thickness by the band that a thin plate needs alone.
+pub(crate) fn has_tables_of(setup: &Setup, other: &Setup) -> bool {
+    let mut alike = *setup;
+    alike.layers.bone_thickness = other.layers.bone_thickness;
+    alike == *other && sampling::thinness(setup).to_bits() == sampling::thinness(other).to_bits()
 }
 
 impl GradeCaches {

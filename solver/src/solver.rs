@@ -8,9 +8,9 @@ use osteon_common::realization::Ensemble;
 use osteon_common::sampling;
 use osteon_common::settings::Method;
 
-use crate::exact::Exact;
 use crate::exact::pass::ExactWorkspace;
 use crate::exact::table_cache::TableMemory;
+use crate::exact::{Exact, has_tables_of};
 use crate::hybrid::{Hybrid, HybridWorkspace};
 use crate::isa::Isa;
 
@@ -125,6 +125,31 @@ impl Solver {
         }
     }
 
+    /// Makes this the solver for cases of `setup`. Tables that stay the same are kept.
+    pub fn change_setup(&mut self, setup: &Setup) {
+        if self.setup != *setup {
+            *self = self.beside(setup);
+        }
+    }
+
+    /// Returns a solver for another setup, which shares the tables if they are the same.
+    fn beside(&self, setup: &Setup) -> Self {
+        if !has_tables_of(setup, &self.setup) {
+            return Self::with_isa(setup, self.isa);
+        }
+        let reversed = self
+            .reversed
+            .as_ref()
+            .map(|exact| exact.sharing(&Setup { probe: setup.probe.from_other_side(), ..*setup }));
+        Self {
+            setup: *setup,
+            isa: self.isa,
+            exact: self.exact.sharing(setup),
+            reversed,
+            hybrid: Hybrid::with_isa(setup, self.isa),
+        }
+    }
+
     /// Returns the setup.
     pub fn setup(&self) -> &Setup {
         &self.setup
@@ -185,7 +210,8 @@ impl Solver {
     }
 
     /// Computes the realization at `index` of `ensemble`, as a worker returns it. A bone that
-    /// cannot be drawn is the failure `not_finite`.
+    /// cannot be drawn is the failure `not_finite`. If quantities of the setup are random, the
+    /// realization has tables of its own, unless only the thickness of a thick bone is random.
     pub fn realization(
         &self,
         ensemble: &Ensemble,
@@ -195,7 +221,11 @@ impl Solver {
         let Ok(bone) = ensemble.bone(index) else {
             return RealizationResult::failed(FailureKind::NotFinite);
         };
-        match self.arrival(&bone, workspace) {
+        let arrival = match ensemble.own_setup(index, &self.setup) {
+            Some(own) => self.beside(&own).arrival(&bone, workspace),
+            None => self.arrival(&bone, workspace),
+        };
+        match arrival {
             Ok(Arrival { velocity, estimated_error, .. }) => {
                 RealizationResult { outcome: Ok(velocity), estimated_error }
             }

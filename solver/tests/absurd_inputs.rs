@@ -87,7 +87,8 @@ fn setup() -> impl Strategy<Value = Setup> {
 /// there is.
 fn random_bone() -> impl Strategy<Value = Option<Bone>> {
     (decades(-4.0, -0.11), any::<u32>(), 0..1000_u64).prop_map(|(dispersion, seed, index)| {
-        let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
+        let point =
+            Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
         Ensemble::new(&point, u64::from(seed)).ok()?.bone(index).ok()
     })
 }
@@ -249,7 +250,7 @@ properties! {
 /// Messages say what may be wrong, and no number in them has hundreds of digits.
 #[test]
 fn numbers_out_of_scale_are_told_in_short() {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
     let bone = Ensemble::new(&point, 1).unwrap().bone(0).unwrap();
     let changes: [(&str, Change); 5] = [
         ("thickness", |s| s.layers.bone_thickness = 1e-12),

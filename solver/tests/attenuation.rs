@@ -12,7 +12,8 @@ use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 use osteon_solver::{Arrival, Solver, Workspace};
 
-const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const OPTIMUM: Point =
+    Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
 fn quality(quality: f64) -> Attenuation {
     Attenuation { quality_factor: Some(quality), ..Attenuation::default() }

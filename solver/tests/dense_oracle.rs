@@ -107,7 +107,8 @@ fn check(setup: &Setup) {
     let marrow = setup.layers.marrow;
     let seed = 21;
     for dispersion in [0.1, 0.4, 0.7] {
-        let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
+        let point =
+            Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
         let ensemble = Ensemble::new(&point, seed).unwrap();
         for index in 0..10 {
             let bone = ensemble.bone(index).unwrap();

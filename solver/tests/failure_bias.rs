@@ -23,7 +23,7 @@ const MONTE_CARLO: MonteCarlo = MonteCarlo {
 
 /// The paper's optimum with another dispersion.
 fn at(dispersion: f64) -> Point {
-    Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion])
+    Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion])
 }
 
 fn outcomes(point: &Point) -> Vec<Outcome> {

@@ -24,7 +24,7 @@ fn setup(change: impl Fn(&mut Setup)) -> Setup {
 }
 
 fn bone(dispersion: f64, seed: u64, index: u64) -> Bone {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
     Ensemble::new(&point, seed).unwrap().bone(index).unwrap()
 }
 

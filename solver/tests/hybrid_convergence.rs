@@ -9,7 +9,7 @@ use osteon_solver::hybrid::{ConvergenceRow, element_convergence, time_step_conve
 
 /// A triclinic draw.
 fn bone() -> Bone {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.2]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.2]);
     Ensemble::new(&point, 5).unwrap().bone(0).unwrap()
 }
 

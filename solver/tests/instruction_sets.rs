@@ -9,7 +9,7 @@ use osteon_solver::{Isa, Solver, Workspace};
 
 /// The first `count` draws at a dispersion, on every instruction set: all numbers of an arrival.
 fn check(change: impl Fn(&mut Setup), dispersion: f64, count: u64) {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
     let ensemble = Ensemble::new(&point, 2).unwrap();
     let mut setup = Setup::default();
     change(&mut setup);
@@ -60,7 +60,7 @@ fn and_with_a_tilted_probe_in_both_directions() {
 
 #[test]
 fn every_instruction_set_gives_the_same_traces() {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.25]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.25]);
     let bone = Ensemble::new(&point, 4).unwrap().bone(0).unwrap();
     let sets = Isa::available();
     // The set without fused multiply-adds takes minutes for a trace.
@@ -76,7 +76,7 @@ fn every_instruction_set_gives_the_same_traces() {
 fn a_velocity_does_not_depend_on_what_was_computed_before() {
     let setup = Setup::default();
     let solver = Solver::new(&setup);
-    let wide = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.5]);
+    let wide = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.5]);
     let ensemble = Ensemble::new(&wide, 3).unwrap();
     let mut used = Workspace::default();
     for index in (0..20).rev() {

@@ -13,7 +13,7 @@ use osteon_solver::{Arrival, Complex, Solver, Workspace, admittance};
 
 /// The paper's optimum with another dispersion.
 fn draws(dispersion: f64, seed: u64) -> Ensemble {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
     Ensemble::new(&point, seed).unwrap()
 }
 

@@ -15,7 +15,7 @@ const OPTIMUM: [f64; 6] = [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495];
 /// Bone `index` of the paper's optimum with another dispersion.
 fn draw(dispersion: f64, seed: u64, index: u64) -> Bone {
     let [density, e_l, nu_l, g_l, e_t, nu_t] = OPTIMUM;
-    let point = Point([density, e_l, nu_l, g_l, e_t, nu_t, dispersion]);
+    let point = Point::of_bone([density, e_l, nu_l, g_l, e_t, nu_t, dispersion]);
     Ensemble::new(&point, seed).unwrap().bone(index).unwrap()
 }
 

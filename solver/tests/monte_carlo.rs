@@ -10,7 +10,7 @@ use osteon_solver::{Solver, Workspace};
 
 #[test]
 fn moments_at_the_papers_optimum_are_those_of_an_independent_sampler() {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     let ensemble = Ensemble::new(&point, 1).unwrap();
     let solver = Solver::new(&Setup::default());
     let mut workspace = Workspace::default();

@@ -12,7 +12,7 @@ use osteon_solver::{Arrival, Failure, Solver, Workspace, fastest_wave};
 const FAR: [f64; 2] = [30e-3, 30e-3];
 
 fn bone(dispersion: f64, index: u64) -> Bone {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion]);
     Ensemble::new(&point, 5).unwrap().bone(index).unwrap()
 }
 

@@ -12,7 +12,7 @@ use osteon_solver::{Solver, Workspace};
 fn an_arrival_says_what_was_sampled() {
     let (setup, mut workspace) = (Setup::default(), Workspace::default());
     let nominal = sampling::nominal(&setup);
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.6]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.6]);
     let ensemble = Ensemble::new(&point, 7).unwrap();
     let solver = Solver::new(&setup);
     let (mut once, mut often) = (0, 0);
@@ -33,8 +33,10 @@ fn an_arrival_says_what_was_sampled() {
     assert!(once > 0 && often > 0, "{once} once, {often} more often");
     let mut refined = setup;
     refined.solver.refinement = 2.0;
-    let usual =
-        Ensemble::new(&Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]), 7);
+    let usual = Ensemble::new(
+        &Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]),
+        7,
+    );
     let bone = usual.unwrap().bone(0).unwrap();
     let found = Solver::new(&refined).arrival(&bone, &mut workspace).unwrap();
     let band = sampling::nominal(&refined).first_band();

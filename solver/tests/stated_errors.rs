@@ -11,7 +11,7 @@ use osteon_solver::{Arrival, Solver, Workspace};
 /// Checks that of eight bones at most `beyond` velocities are farther than stated from those of refinement
 /// 4, and none is by twice that, or by more than `bound`.
 fn check(name: &str, bound: f64, beyond: usize, change: impl Fn(&mut Setup)) {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
     let ensemble = Ensemble::new(&point, 3).unwrap();
     let mut workspace = Workspace::default();
     let [default, refined] = [1.0, 4.0].map(|refinement| {

@@ -8,7 +8,8 @@ use osteon_common::probe::Place;
 use osteon_common::realization::Ensemble;
 use osteon_solver::{Arrival, Solver, Workspace};
 
-const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const OPTIMUM: Point =
+    Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 const DEGREE: f64 = 0.017_453_292_519_943_295;
 
 fn random_bone() -> Bone {

@@ -22,7 +22,8 @@ fn velocities(point: Point, thickness: f64) -> [f64; 2] {
 
 fn check(name: &str, constants: [f64; 6], bound: f64) {
     let [rho, e_l, nu_l, g_l, e_t, nu_t] = constants;
-    let [found, reference] = velocities(Point([rho, e_l, nu_l, g_l, e_t, nu_t, 0.1]), 4e-3);
+    let [found, reference] =
+        velocities(Point::of_bone([rho, e_l, nu_l, g_l, e_t, nu_t, 0.1]), 4e-3);
     let error = (found / reference - 1.0).abs();
     assert!(error <= bound, "{name}: {found} against {reference}: {error:e}");
 }
@@ -47,7 +48,7 @@ fn no_velocity_jumps_where_the_sampling_changes() {
     for bin in 17..21 {
         let setup = Setup::default();
         let elasticity =
-            Point([1700.0, 17e9, 0.37, 4.8e9, 10e9, 0.44, 0.1]).constants().elasticity();
+            Point::of_bone([1700.0, 17e9, 0.37, 4.8e9, 10e9, 0.44, 0.1]).constants().elasticity();
         let bone = Bone { density: 1700.0, elasticity: elasticity.unwrap() };
         let edge = osteon_common::sampling::speed_bin_edge(&setup, bin);
         let ratio = osteon_solver::fastest_wave(&bone) / edge;

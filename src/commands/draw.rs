@@ -6,7 +6,6 @@ use anyhow::{Context as _, anyhow};
 use osteon_common::case::Case;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::parameters::Point;
-use osteon_common::realization::Ensemble;
 use osteon_files::{case_file, job_file, report};
 
 use crate::arguments::DrawArguments;
@@ -36,14 +35,14 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<ExitStatus, CommandFailu
         }
         None => specification.start(),
     };
-    let ensemble = Ensemble::drawn(&point, specification.monte_carlo.germs())
-        .map_err(CommandFailure::bad_input)?;
+    let ensemble = specification.ensemble(&point).map_err(CommandFailure::bad_input)?;
     let bone = ensemble.bone(index).map_err(|error| {
         CommandFailure::failed(anyhow::Error::new(error).context(format!(
             "realization {index} has no finite elasticity matrix (failure not_finite)"
         )))
     })?;
-    let text = case_file::to_toml(&Case { setup: specification.setup, bone });
+    let setup = ensemble.setup(index, &specification.setup);
+    let text = case_file::to_toml(&Case { setup, bone });
     output::stdout(OutputFormat::Text).verbatim(&text).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }

@@ -1,4 +1,5 @@
 use osteon_common::job::{Data, Group, MonteCarlo, Objective, Search};
+use osteon_common::random_quantities::RandomQuantities;
 
 use super::*;
 
@@ -7,7 +8,7 @@ const OPTIMUM: [f64; 7] = [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 
 
 /// Creates a search for e_L and δ, and for the density if `density` is free.
 fn job(data: Data, density: Range) -> JobSpecification {
-    let mut parameters = OPTIMUM.map(Range::Fixed);
+    let mut parameters = Range::of_bone(OPTIMUM.map(Range::Fixed));
     parameters[0] = density;
     parameters[1] = Range::Free { start: 17e9, lower: 12e9, upper: 25e9 };
     parameters[6] = Range::Free { start: 0.1, lower: 0.02, upper: 0.3 };
@@ -16,6 +17,7 @@ fn job(data: Data, density: Range) -> JobSpecification {
         setup: Setup::default(),
         data: Some(data),
         parameters,
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),

@@ -44,6 +44,9 @@ pub(crate) enum Study {
     Twins(TwinsArguments),
     /// Count how many confidence intervals contain the true value, over data sets of 100 velocities
     Coverage(TwinsArguments),
+    /// Count them for bones that differ in thickness, attenuation, coupling and tilt, with a model that
+    /// knows the laws of these differences and with one that does not
+    Populations(TwinsArguments),
     /// Count how many intervals of posteriors contain the true value, over parameter sets drawn from
     /// the prior with all seven parameters free
     Posteriors(PosteriorsArguments),

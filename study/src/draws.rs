@@ -12,7 +12,8 @@ use osteon_solver::{Arrival, Failure, Isa, Solver, Workspace};
 use rayon::prelude::*;
 
 /// The optimum of the paper.
-pub const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+pub const OPTIMUM: Point =
+    Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
 /// Number of bones to draw, seed and instruction set.
 #[derive(Debug, Clone, Copy)]

@@ -6,7 +6,8 @@ use std::convert::Infallible;
 use osteon_common::case::Setup;
 use osteon_common::job::{JobSpecification, MonteCarlo};
 use osteon_common::outcome::{Outcome, RealizationResult};
-use osteon_common::parameters::Point;
+use osteon_common::parameters::{PARAMETERS, Point};
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::realization::{Ensemble, PointError};
 use osteon_search::{CompletedJob, IdentifyError};
 use osteon_solver::{Isa, Solver};
@@ -15,7 +16,45 @@ use crate::draws::solved;
 
 /// Cache of the realizations at the points at which several identifications begin, by the bits of
 /// the point.
-pub(crate) type RealizationCache = BTreeMap<[u64; 7], Vec<RealizationResult>>;
+pub(crate) type RealizationCache = BTreeMap<[u64; PARAMETERS], Vec<RealizationResult>>;
+
+/// Layers and probe, and how they differ from realization to realization.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Surroundings {
+    /// The setup, with the means.
+    pub(crate) setup: Setup,
+    /// The scatter about them.
+    pub(crate) random: RandomQuantities,
+}
+
+impl Surroundings {
+    /// Returns the velocities of independent realizations at a point, without those that fail.
+    ///
+    /// # Errors
+    /// If the point has no ensemble.
+    pub(crate) fn velocities(
+        &self,
+        point: &Point,
+        count: u64,
+        seed: u64,
+        isa: Isa,
+    ) -> Result<Vec<f64>, PointError> {
+        let drawn = MonteCarlo { realizations: count, seed, ..MonteCarlo::default() };
+        Ok(self.outcomes(point, &drawn, isa)?.into_iter().filter_map(Outcome::ok).collect())
+    }
+
+    fn outcomes(
+        &self,
+        point: &Point,
+        monte_carlo: &MonteCarlo,
+        isa: Isa,
+    ) -> Result<Vec<Outcome>, PointError> {
+        let ensemble = Ensemble::drawn(point, monte_carlo.germs())?.with_random(self.random);
+        let solver = Solver::with_isa(&self.setup, isa);
+        let solved = solved(&solver, &ensemble, monte_carlo.realizations);
+        Ok(solved.into_iter().map(|one| one.outcome).collect())
+    }
+}
 
 /// Computes the outcomes of every realization at a point of the paper's geometry, in index order.
 ///
@@ -26,10 +65,7 @@ pub(crate) fn outcomes(
     monte_carlo: &MonteCarlo,
     isa: Isa,
 ) -> Result<Vec<Outcome>, PointError> {
-    let ensemble = Ensemble::drawn(point, monte_carlo.germs())?;
-    let solver = Solver::with_isa(&Setup::default(), isa);
-    let solved = solved(&solver, &ensemble, monte_carlo.realizations);
-    Ok(solved.into_iter().map(|one| one.outcome).collect())
+    Surroundings::default().outcomes(point, monte_carlo, isa)
 }
 
 /// Returns the velocities of independent realizations at a point of the paper's geometry, without
@@ -43,8 +79,7 @@ pub(crate) fn velocities(
     seed: u64,
     isa: Isa,
 ) -> Result<Vec<f64>, PointError> {
-    let drawn = MonteCarlo { realizations: count, seed, ..MonteCarlo::default() };
-    Ok(outcomes(point, &drawn, isa)?.into_iter().filter_map(Outcome::ok).collect())
+    Surroundings::default().velocities(point, count, seed, isa)
 }
 
 /// Runs an identification to its end. The realizations at its first point are taken from `known`,
@@ -57,7 +92,7 @@ pub(crate) fn identify(
     known: &mut RealizationCache,
     isa: Isa,
 ) -> Result<CompletedJob, IdentifyError<Infallible>> {
-    let solver = Solver::with_isa(&specification.setup, isa);
+    let mut solver = Solver::with_isa(&specification.setup, isa);
     let mut begun = false;
     osteon_search::identify(specification, |realizations| {
         let bits = realizations.point.0.map(f64::to_bits);
@@ -65,6 +100,7 @@ pub(crate) fn identify(
         if let Some(found) = known.get(&bits) {
             return Ok(found.clone());
         }
+        solver.change_setup(&realizations.point.setup(&specification.setup));
         let found = solved(&solver, &realizations.ensemble, realizations.count);
         if is_first {
             known.insert(bits, found.clone());

@@ -106,6 +106,9 @@ fn measured(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::Coverage(arguments) => {
             over_twins("coverage", twins::REPETITIONS, twins::coverage, arguments, isa)
         }
+        Study::Populations(arguments) => {
+            over_twins("populations", twins::REPETITIONS, twins::populations, arguments, isa)
+        }
         Study::Posteriors(arguments) => over_posteriors(arguments, isa),
         Study::PosteriorReference(arguments) => over_draws(&POSTERIOR_REFERENCE, arguments, isa),
         Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),

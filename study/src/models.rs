@@ -63,7 +63,7 @@ fn measured(thickness: f64, draws: &Draws) -> Result<Vec<MeasuredDraw>, PointErr
 /// admissible.
 pub(crate) fn mean_model(seed: u64, index: u64) -> Point {
     let mut generator = Generator::for_index(seed, index);
-    let mut drawn = || Point(BOUNDS.map(|(from, to)| generator.between(from, to)));
+    let mut drawn = || Point::of_bone(BOUNDS.map(|(from, to)| generator.between(from, to)));
     for _ in 1..TRIES_MAX {
         let point = drawn();
         if point.constants().elasticity().is_ok() {

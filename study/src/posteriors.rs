@@ -16,6 +16,7 @@ use osteon_common::job::{
 };
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorSummary};
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::statistics::PointStatistics;
 use osteon_solver::Isa;
 use rayon::prelude::*;
@@ -229,7 +230,8 @@ fn specification(data: Data, monte_carlo: MonteCarlo) -> JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
         data: Some(data),
-        parameters: BOUNDS.map(range),
+        parameters: Range::of_bone(BOUNDS.map(range)),
+        random: RandomQuantities::default(),
         monte_carlo,
         objective: Objective::default(),
         search: Search::by(SearchMethod::Posterior),

@@ -7,6 +7,7 @@ use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search, SearchMethod,
 };
 use osteon_common::parameters::{Parameter, Point};
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::realization::PointError;
 use osteon_common::results::{Moments, Status};
 use osteon_common::statistics;
@@ -68,7 +69,7 @@ pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, 
 /// Returns the starts with their names.
 fn starts(seed: u64) -> Vec<(String, Point)> {
     let random = (0..RANDOM_STARTS).map(|k| (format!("random {}", k + 1), mean_model(seed, k)));
-    let mut corner = Point(BOUNDS.map(|(lower, upper)| 0.5 * (lower + upper)));
+    let mut corner = Point::of_bone(BOUNDS.map(|(lower, upper)| 0.5 * (lower + upper)));
     corner.0[Parameter::Density as usize] = 1950.0;
     corner.0[Parameter::LongitudinalShearModulus as usize] = 3.3e9;
     random.chain([("slow shear".to_owned(), corner)]).collect()
@@ -122,10 +123,11 @@ fn found(
         kind: JobKind::Identification,
         setup: Setup::default(),
         data: Some(Data::from_moments(mean, coefficient_of_variation)),
-        parameters: std::array::from_fn(|i| {
+        parameters: Range::of_bone(std::array::from_fn(|i| {
             let (lower, upper) = BOUNDS[i];
             Range::Free { start: start.0[i], lower, upper }
-        }),
+        })),
+        random: RandomQuantities::default(),
         monte_carlo: monte_carlo(draws),
         objective: Objective::default(),
         search,
@@ -208,7 +210,9 @@ fn to_unit(point: &Point) -> [f64; 7] {
 
 fn of_unit(unit: &[f64]) -> Point {
     let mut unit = unit.iter();
-    Point(BOUNDS.map(|(lower, upper)| lower + unit.next().unwrap_or(&0.0) * (upper - lower)))
+    Point::of_bone(
+        BOUNDS.map(|(lower, upper)| lower + unit.next().unwrap_or(&0.0) * (upper - lower)),
+    )
 }
 
 /// Returns the distance in edges of the box.
@@ -254,8 +258,8 @@ mod tests {
 
     #[test]
     fn distances_are_in_edges_of_the_box() {
-        let lower = Point(BOUNDS.map(|(lower, _)| lower));
-        let upper = Point(BOUNDS.map(|(_, upper)| upper));
+        let lower = Point::of_bone(BOUNDS.map(|(lower, _)| lower));
+        let upper = Point::of_bone(BOUNDS.map(|(_, upper)| upper));
         assert_eq!(distance(&lower, &upper), 7.0_f64.sqrt());
         assert!(distance(&of_unit(&to_unit(&OPTIMUM)), &OPTIMUM) < 1e-15);
     }

@@ -318,14 +318,14 @@ fn attenuate(layers: &mut Layers, generator: &mut Generator, factors: [(f64, f64
 
 /// Half of the means are the optimum's, made stiffer or softer; half are isotropic.
 fn point(generator: &mut Generator) -> Point {
-    let [_, e_l, nu_l, g_l, e_t, nu_t, _] = OPTIMUM.0;
+    let [_, e_l, nu_l, g_l, e_t, nu_t, ..] = OPTIMUM.0;
     let density = generator.between(1400.0, 2200.0);
     let stiffness = generator.decades(0.3, 2.0);
     let nu = generator.between(0.15, 0.42);
     let dispersion = generator.decades(0.01, 0.79);
     if generator.uniform() < 0.5 {
         let [e_l, g_l, e_t] = [e_l, g_l, e_t].map(|modulus| stiffness * modulus);
-        Point([density, e_l, nu_l, g_l, e_t, nu_t, dispersion])
+        Point::of_bone([density, e_l, nu_l, g_l, e_t, nu_t, dispersion])
     } else {
         let e = stiffness * e_t;
         let constants = EngineeringConstants {
@@ -336,7 +336,7 @@ fn point(generator: &mut Generator) -> Point {
             transverse_poisson_ratio: nu,
         };
         let g = constants.longitudinal_shear_modulus;
-        Point([density, e, nu, g, e, nu, dispersion])
+        Point::of_bone([density, e, nu, g, e, nu, dispersion])
     }
 }
 

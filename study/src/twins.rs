@@ -9,12 +9,14 @@ use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
 };
 use osteon_common::parameters::{Parameter, Point};
+use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::realization::PointError;
 use osteon_search::IdentifyError;
 use osteon_solver::Isa;
 
 use crate::draws::OPTIMUM;
-use crate::identify::{RealizationCache, identify, velocities};
+use crate::generator::Generator;
+use crate::identify::{RealizationCache, Surroundings, identify};
 use crate::models::{BOUNDS, mean_model};
 use crate::table::{MarkdownTable, two_digits};
 use crate::{RowCallback, StudyError};
@@ -31,28 +33,35 @@ pub struct Twins {
 }
 
 /// Default number of parameter sets of [`table`].
-pub const SETS: u64 = 20;
-/// Default number of data sets of [`coverage`].
+pub const SETS: u64 = 28;
+/// Default number of data sets of [`coverage`] and [`populations`].
 pub const REPETITIONS: u64 = 200;
 /// Number of velocities of the data of each parameter set, as many as the paper has.
 const VELOCITIES: u64 = 2747;
-/// Number of velocities of each data set in [`coverage`].
+/// Number of velocities of each data set in [`coverage`] and [`populations`].
 const COUNTED: u64 = 100;
 /// Maximum fraction of failed realizations of the data.
 const FAILED_MAX: f64 = 0.01;
 /// Number of realizations of the model.
 const REALIZATIONS: u64 = 256;
 /// The parameters searched together with the dispersion, one after another.
-const SEARCHED: [Parameter; 5] = [
+const SEARCHED: [Parameter; 7] = [
     Parameter::LongitudinalYoungModulus,
     Parameter::Density,
     Parameter::LongitudinalPoissonRatio,
     Parameter::TransverseYoungModulus,
     Parameter::TransversePoissonRatio,
+    Parameter::BoneThickness,
+    Parameter::BoneQualityFactor,
 ];
+/// Truths of the bone's thickness, m, and bounds of its search: in thicker plates the velocity hardly
+/// depends on it.
+const THICKNESSES: [(f64, f64); 2] = [(0.8e-3, 1.4e-3), (0.6e-3, 1.6e-3)];
+/// Truths of the quality factor, and bounds of its search.
+const QUALITY_FACTORS: [(f64, f64); 2] = [(8.0, 20.0), (4.0, 40.0)];
 
 /// Identifies parameters from the velocities of known parameter sets, with the dispersion and one
-/// of five other parameters free and the rest fixed. Returns the values found, and their distance
+/// of seven other parameters free and the rest fixed. Returns the values found, and their distance
 /// from the truth in reported standard errors.
 ///
 /// The sets are uniform within the bounds of the paper's example, the dispersion in 0.05 to 0.2;
@@ -73,7 +82,7 @@ pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, 
     ]);
     let mut candidates = 0..;
     for (set, &searched) in (0..twins.repetitions).zip(SEARCHED.iter().cycle()) {
-        let (truth, data) = drawn_set(twins, &mut candidates)?;
+        let (truth, data) = drawn_set(twins, searched, &mut candidates)?;
         let specification = specification(&truth, searched, data, twins.seed);
         let found = found(&specification, &mut RealizationCache::new(), twins.isa)?;
         let mut row = vec![(set + 1).to_string(), searched.name().replace('_', " ")];
@@ -96,51 +105,126 @@ pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, 
 /// # Errors
 /// If a point has no ensemble.
 pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
-    let mut table = MarkdownTable::new(&[
-        "quantity",
-        "data sets",
-        "intervals that hold it (%)",
-        "s.d. of (found - true)/s.e.",
-    ]);
-    let truths = [bulk_velocity(&OPTIMUM), OPTIMUM.dispersion()];
-    let mut counts = [0_u64; 2];
-    let mut squares = [0.0; 2];
-    let mut known = RealizationCache::new();
-    for repetition in 0..twins.repetitions {
-        let data = velocities(&OPTIMUM, COUNTED, data_seed(twins.seed, repetition), twins.isa)?;
-        let searched = Parameter::LongitudinalYoungModulus;
-        let mut specification = specification(&OPTIMUM, searched, data, twins.seed);
-        // The same start for all data sets, different from the truth.
-        specification.parameters[searched as usize] = free(searched, 19e9);
-        specification.parameters[Parameter::Dispersion as usize] =
-            free(Parameter::Dispersion, 0.12);
-        let found = found(&specification, &mut known, twins.isa)?;
-        let quantities = found.map(|found| [found.bulk_velocity, found.dispersion]);
-        for (i, quantity) in quantities.iter().flatten().enumerate() {
-            let Some(Uncertainty { interval: [lower, upper], .. }) = quantity.known else {
-                continue;
-            };
-            counts[i] += u64::from((lower..=upper).contains(&truths[i]));
-            squares[i] += errors(quantity, truths[i]).map_or(f64::NAN, |errors| errors * errors);
+    let usual = Surroundings::default();
+    let counts = Counts::of(twins, &usual, &usual, progress)?;
+    let mut table = MarkdownTable::new(&COUNTED_COLUMNS);
+    counts.rows().into_iter().for_each(|row| table.push(row));
+    Ok(table)
+}
+
+/// The same for bones of a population: thicknesses of 4 ± 0.5 mm and quality factors of 15 ± 2, a
+/// coupling of 1500 ± 15 m/s, and a probe's tilt of 0 ± 0.5°. The model knows these laws, or takes the
+/// means for all bones.
+///
+/// # Errors
+/// If a point has no ensemble.
+pub fn populations(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
+    let columns: Vec<&str> = [&["the model's laws"], &COUNTED_COLUMNS[..]].concat();
+    let mut table = MarkdownTable::new(&columns);
+    let population = population();
+    let means = Surroundings { random: RandomQuantities::default(), ..population };
+    for (model, name) in [(&population, "those of the data"), (&means, "none")] {
+        let counts = Counts::of(twins, &population, model, progress)?;
+        for row in counts.rows() {
+            table.push([vec![name.to_owned()], row].concat());
         }
-        progress(&format!("{}: {counts:?}", repetition + 1));
-    }
-    for (i, name) in ["√(c1111/ρ)", "dispersion"].into_iter().enumerate() {
-        let all = twins.repetitions as f64;
-        table.push(vec![
-            name.to_owned(),
-            twins.repetitions.to_string(),
-            format!("{:.1}", 100.0 * counts[i] as f64 / all),
-            format!("{:.2}", (squares[i] / all).sqrt()),
-        ]);
     }
     Ok(table)
+}
+
+/// The setup and the laws of the bones of [`populations`].
+fn population() -> Surroundings {
+    let scatter = |standard_deviation, distribution| Scatter {
+        standard_deviation: Some(standard_deviation),
+        distribution,
+    };
+    let mut setup = Setup::default();
+    setup.layers.bone_attenuation.quality_factor = Some(15.0);
+    let random = RandomQuantities {
+        bone_thickness: scatter(0.5e-3, RandomDistribution::Normal),
+        bone_quality_factor: scatter(2.0, RandomDistribution::LogNormal),
+        coupling_sound_speed: scatter(15.0, RandomDistribution::Uniform),
+        probe_tilt: scatter(0.5_f64.to_radians(), RandomDistribution::Normal),
+    };
+    Surroundings { setup, random }
+}
+
+/// Columns of a table of [`Counts`].
+const COUNTED_COLUMNS: [&str; 4] =
+    ["quantity", "data sets", "intervals that hold it (%)", "s.d. of (found - true)/s.e."];
+
+/// How often intervals contain the truth, and the squares of the errors in standard errors: of
+/// √(c1111/ρ) and of the dispersion.
+struct Counts {
+    repetitions: u64,
+    held: [u64; 2],
+    squares: [f64; 2],
+}
+
+impl Counts {
+    /// Counts over data sets that are made in some surroundings, and identified by a model in others.
+    fn of(
+        twins: &Twins,
+        data: &Surroundings,
+        model: &Surroundings,
+        progress: RowCallback<'_>,
+    ) -> Result<Self, StudyError> {
+        let truths = [bulk_velocity(&OPTIMUM), OPTIMUM.dispersion()];
+        let mut counts = Self { repetitions: twins.repetitions, held: [0; 2], squares: [0.0; 2] };
+        let mut known = RealizationCache::new();
+        for repetition in 0..twins.repetitions {
+            let seed = data_seed(twins.seed, repetition);
+            let velocities = data.velocities(&OPTIMUM, COUNTED, seed, twins.isa)?;
+            let specification = counted_specification(model, velocities, twins.seed);
+            let found = found(&specification, &mut known, twins.isa)?;
+            let quantities = found.map(|found| [found.bulk_velocity, found.dispersion]);
+            for (i, quantity) in quantities.iter().flatten().enumerate() {
+                let Some(Uncertainty { interval: [lower, upper], .. }) = quantity.known else {
+                    continue;
+                };
+                counts.held[i] += u64::from((lower..=upper).contains(&truths[i]));
+                counts.squares[i] +=
+                    errors(quantity, truths[i]).map_or(f64::NAN, |errors| errors * errors);
+            }
+            progress(&format!("{}: {:?}", repetition + 1, counts.held));
+        }
+        Ok(counts)
+    }
+
+    fn rows(&self) -> Vec<Vec<String>> {
+        let all = self.repetitions as f64;
+        let row = |(i, name): (usize, &str)| {
+            vec![
+                name.to_owned(),
+                self.repetitions.to_string(),
+                format!("{:.1}", 100.0 * self.held[i] as f64 / all),
+                format!("{:.2}", (self.squares[i] / all).sqrt()),
+            ]
+        };
+        ["√(c1111/ρ)", "dispersion"].into_iter().enumerate().map(row).collect()
+    }
+}
+
+/// Returns a specification in which e_L and the dispersion are free, with the same start for all data
+/// sets, different from the truth.
+fn counted_specification(
+    model: &Surroundings,
+    velocities: Vec<f64>,
+    seed: u64,
+) -> JobSpecification {
+    let searched = Parameter::LongitudinalYoungModulus;
+    let mut specification = specification(&OPTIMUM, searched, velocities, seed);
+    specification.parameters[searched as usize] = free(searched, 19e9);
+    specification.parameters[Parameter::Dispersion as usize] = free(Parameter::Dispersion, 0.12);
+    let &Surroundings { setup, random } = model;
+    JobSpecification { setup, random, ..specification }
 }
 
 /// Returns the next parameter set for which enough velocities can be computed, with these
 /// velocities.
 fn drawn_set(
     twins: &Twins,
+    searched: Parameter,
     candidates: &mut impl Iterator<Item = u64>,
 ) -> Result<(Point, Vec<f64>), PointError> {
     loop {
@@ -149,11 +233,40 @@ fn drawn_set(
         let (lower, upper) = BOUNDS[Parameter::Dispersion as usize];
         let share = (point.dispersion() - lower) / (upper - lower);
         point.0[Parameter::Dispersion as usize] = 0.05 + 0.15 * share;
-        let data = velocities(&point, VELOCITIES, data_seed(twins.seed, number), twins.isa)?;
+        if let Some([(lower, upper), _]) = of_setup(searched) {
+            let share = Generator::for_index(twins.seed, number).between(0.0, 1.0);
+            point.0[searched as usize] = lower + share * (upper - lower);
+        }
+        let around =
+            Surroundings { setup: point.setup(&setup_for(searched)), ..Surroundings::default() };
+        let seed = data_seed(twins.seed, number);
+        let data = around.velocities(&point, VELOCITIES, seed, twins.isa)?;
         if data.len() as f64 >= (1.0 - FAILED_MAX) * VELOCITIES as f64 {
             return Ok((point, data));
         }
     }
+}
+
+/// Returns the truths and the bounds of a parameter of the setup.
+fn of_setup(parameter: Parameter) -> Option<[(f64, f64); 2]> {
+    match parameter {
+        Parameter::BoneThickness => Some(THICKNESSES),
+        Parameter::BoneQualityFactor => Some(QUALITY_FACTORS),
+        _ => None,
+    }
+}
+
+fn bounds(parameter: Parameter) -> (f64, f64) {
+    of_setup(parameter).map_or_else(|| BOUNDS[parameter as usize], |[_, bounds]| bounds)
+}
+
+/// Returns the paper's geometry; with attenuation if its quality factor is searched.
+fn setup_for(searched: Parameter) -> Setup {
+    let mut setup = Setup::default();
+    if searched == Parameter::BoneQualityFactor {
+        setup.layers.bone_attenuation.quality_factor = Some(15.0);
+    }
+    setup
 }
 
 /// Returns a seed whose germs differ from the model's.
@@ -170,7 +283,7 @@ fn specification(
     seed: u64,
 ) -> JobSpecification {
     let middle = |parameter: Parameter| {
-        let (lower, upper) = BOUNDS[parameter as usize];
+        let (lower, upper) = bounds(parameter);
         free(parameter, 0.5 * (lower + upper))
     };
     let range = |parameter: Parameter| match parameter {
@@ -180,9 +293,10 @@ fn specification(
     };
     JobSpecification {
         kind: JobKind::Identification,
-        setup: Setup::default(),
+        setup: setup_for(searched),
         data: Some(Data::from_velocities(velocities)),
         parameters: Parameter::ALL.map(range),
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo {
             realizations: REALIZATIONS,
             seed,
@@ -208,7 +322,7 @@ fn start_within(parameter: Parameter, truth: &Point, middle: Range) -> Range {
 }
 
 fn free(parameter: Parameter, start: f64) -> Range {
-    let (lower, upper) = BOUNDS[parameter as usize];
+    let (lower, upper) = bounds(parameter);
     Range::Free { start: start.clamp(lower, upper), lower, upper }
 }
 
@@ -250,13 +364,13 @@ mod tests {
 
     #[test]
     fn what_made_the_data_is_found_within_three_standard_errors() {
-        let twins = Twins { repetitions: 3, seed: 3, isa: Isa::fastest() };
+        let twins = Twins { repetitions: 7, seed: 3, isa: Isa::fastest() };
         let rows = RefCell::new(0);
         let table = table(&twins, &|_| *rows.borrow_mut() += 1).unwrap();
-        assert_eq!(*rows.borrow(), 3);
+        assert_eq!(*rows.borrow(), 7);
         for column in [4, 7] {
             let within = cells(&table, column).iter().filter(|errors| errors.abs() < 3.0).count();
-            assert!(within >= 2, "{table}");
+            assert!(within >= 6, "{table}");
         }
     }
 
@@ -266,5 +380,17 @@ mod tests {
         let table = coverage(&twins, &|_| {}).unwrap();
         assert!(cells(&table, 2).iter().all(|share| *share >= 75.0), "{table}");
         assert!(cells(&table, 3).iter().all(|sd| (0.5..1.6).contains(sd)), "{table}");
+    }
+
+    /// With the laws of the population the intervals hold; without them the scatter of the population
+    /// is taken for dispersion.
+    #[test]
+    fn a_population_is_not_taken_for_dispersion() {
+        let twins = Twins { repetitions: 2, seed: 5, isa: Isa::fastest() };
+        let table = populations(&twins, &|_| {}).unwrap();
+        let held = cells(&table, 3);
+        assert!(held[0] >= 50.0 && held[1] >= 50.0, "{table}");
+        let errors = cells(&table, 4);
+        assert!(errors[3] > 2.0 * errors[1], "{table}");
     }
 }

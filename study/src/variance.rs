@@ -36,7 +36,7 @@ pub struct Repetitions {
 
 /// Result of the repetitions of one estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scatter {
+pub struct SeedScatter {
     /// Standard deviations of the moments over the seeds: of the mean in m/s, and of the
     /// coefficient of variation.
     pub deviation: Moments,
@@ -104,7 +104,7 @@ pub fn scatter(
     sampling: Sampling,
     scrambles: u64,
     repetitions: &Repetitions,
-) -> Result<[Scatter; 2], PointError> {
+) -> Result<[SeedScatter; 2], PointError> {
     let solver = Solver::with_isa(&Setup::default(), repetitions.isa);
     let mut estimates = [Vec::new(), Vec::new()];
     let mut failed = 0;
@@ -119,10 +119,10 @@ pub fn scatter(
             estimates.extend(statistics::estimate(&monte_carlo, point, &outcomes));
         }
     }
-    Ok(estimates.map(|estimates| Scatter::new(&estimates, failed)))
+    Ok(estimates.map(|estimates| SeedScatter::new(&estimates, failed)))
 }
 
-impl Scatter {
+impl SeedScatter {
     fn new(estimates: &[Estimate], failed: usize) -> Self {
         let of = |moment: fn(&Moments) -> f64| {
             let values = || estimates.iter().map(|estimate| moment(&estimate.moments));
@@ -144,7 +144,7 @@ impl Scatter {
     }
 }
 
-fn cells(found: &Scatter, plain: &Scatter) -> Vec<String> {
+fn cells(found: &SeedScatter, plain: &SeedScatter) -> Vec<String> {
     let of = |moment: fn(&Moments) -> f64| {
         let deviation = moment(&found.deviation);
         let ratio = moment(&plain.deviation) / deviation;
@@ -162,7 +162,7 @@ mod tests {
     const REPETITIONS: fn() -> Repetitions =
         || Repetitions { seeds: 20, first: 1, isa: Isa::fastest() };
 
-    fn gain(found: &Scatter, plain: &Scatter) -> [f64; 2] {
+    fn gain(found: &SeedScatter, plain: &SeedScatter) -> [f64; 2] {
         let square = |ratio: f64| ratio * ratio;
         [
             square(plain.deviation.mean / found.deviation.mean),
@@ -172,7 +172,7 @@ mod tests {
         ]
     }
 
-    fn check_errors(found: &Scatter, what: &str) {
+    fn check_errors(found: &SeedScatter, what: &str) {
         let ratios = [
             found.reported.mean / found.deviation.mean,
             found.reported.coefficient_of_variation / found.deviation.coefficient_of_variation,
@@ -188,7 +188,7 @@ mod tests {
         let of = |sampling| scatter(&OPTIMUM, 1024, sampling, 1, &REPETITIONS()).unwrap();
         let [plain, controlled] = of(Sampling::MonteCarlo);
         let [sobol, both] = of(Sampling::Sobol);
-        let check = |found: &Scatter, least: [f64; 2], what: &str| {
+        let check = |found: &SeedScatter, least: [f64; 2], what: &str| {
             let gain = gain(found, &plain);
             assert!(gain[0] > least[0] && gain[1] > least[1], "{what}: {gain:?}");
             check_errors(found, what);
@@ -206,7 +206,7 @@ mod tests {
             standard_error: Moments { mean: error, coefficient_of_variation: 1.0 },
             controlled: false,
         };
-        let found = Scatter::new(&[estimate(1.0, 3.0), estimate(3.0, 4.0)], 5);
+        let found = SeedScatter::new(&[estimate(1.0, 3.0), estimate(3.0, 4.0)], 5);
         assert!((found.deviation.mean - 2.0_f64.sqrt()).abs() < 1e-15);
         assert!((found.deviation.coefficient_of_variation - 0.02_f64.sqrt()).abs() < 1e-15);
         assert!((found.reported.mean - 12.5_f64.sqrt()).abs() < 1e-15);

@@ -125,7 +125,9 @@ fn compute(
         message: panic_message(payload.as_ref()),
     };
     let prepared = catch_unwind(AssertUnwindSafe(|| {
-        (solvers.get(&evaluation.setup), Ensemble::drawn(&evaluation.point, evaluation.germs))
+        let ensemble = Ensemble::drawn(&evaluation.point, evaluation.germs);
+        let ensemble = ensemble.map(|ensemble| ensemble.with_random(evaluation.random));
+        (solvers.get(&evaluation.point.setup(&evaluation.setup)), ensemble)
     }));
     let (solver, ensemble) = prepared.map_err(|payload| panicked(*first, payload))?;
     let Ok(ensemble) = ensemble else {

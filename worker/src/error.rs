@@ -3,7 +3,7 @@
 use std::fmt;
 
 use osteon_common::germ_source::{GermScheme, GermSource};
-use osteon_common::parameters::{Parameter, Point};
+use osteon_common::parameters::Point;
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::identity::NoRandomness;
 use osteon_proto::malformed::Malformed;
@@ -100,9 +100,9 @@ impl fmt::Display for PanickedCase {
             write!(f, " (sobol, {points} points per scramble)")?;
         }
         f.write_str(" at")?;
-        for (i, parameter) in Parameter::ALL.into_iter().enumerate() {
+        for (i, (parameter, value)) in self.point.given().enumerate() {
             let comma = if i == 0 { "" } else { "," };
-            write!(f, "{comma} {} = {:?}", parameter.name(), self.point.get(parameter))?;
+            write!(f, "{comma} {} = {value:?}", parameter.name())?;
         }
         Ok(())
     }

@@ -1,6 +1,5 @@
 //! Rules on parameters, the Monte Carlo loop and the search.
 
-use crate::accepted::{Interval, written};
 use crate::attainable_moments;
 use crate::inference::MomentWeights;
 use crate::job::{
@@ -9,15 +8,16 @@ use crate::job::{
 use crate::limits;
 use crate::origin::Origin;
 use crate::parameters::Parameter;
-use crate::plausible::PlausibleRange;
 use crate::violations::Violations;
 
 use super::data::{data_from, no_data};
 use super::posterior::posterior_of_job;
 use super::priors::priors;
+use super::range::range;
 use super::section::section;
 use super::setup::setup;
-use super::value::{known_wrong, number, quantity};
+use super::setup_parameters::{random_setup, setup_parameters};
+use super::value::known_wrong;
 
 /// Records all violations of `specification`.
 ///
@@ -44,11 +44,13 @@ pub fn job_from(
         }
         _ => {}
     }
-    for parameter in Parameter::ALL {
+    for parameter in Parameter::OF_BONE {
         range(parameter, specification.range(parameter), violations);
     }
+    setup_parameters(specification, violations);
     admissible_start(specification, violations);
     something_to_search(specification, violations);
+    random_setup(specification, violations);
     let (mut checked, mut default) = (specification.monte_carlo, MonteCarlo::default());
     section("monte_carlo", &mut checked, &mut default, violations);
     scrambles(&specification.monte_carlo, violations);
@@ -63,53 +65,6 @@ pub fn job_from(
     within_reach(specification, violations);
 }
 
-fn range(parameter: Parameter, range: Range, violations: &mut Violations) {
-    let path = format!("parameters.{}", parameter.name());
-    let (accepted, kind) = (Interval::of(parameter), PlausibleRange::of(parameter));
-    match range {
-        Range::Fixed(value) => {
-            quantity(&format!("{path}.fixed"), value, accepted, &kind, violations);
-        }
-        Range::Free { start, lower, upper } => {
-            let (start_path, bounds_path) = (format!("{path}.start"), format!("{path}.bounds"));
-            quantity(&start_path, start, accepted, &kind, violations);
-            bounds(&bounds_path, [lower, upper], accepted, &kind, violations);
-            if !known_wrong(&bounds_path, violations) {
-                let within = Interval::from_to(lower, upper, "the bounds");
-                number(&start_path, start, within, violations);
-            }
-        }
-    }
-}
-
-fn bounds(
-    path: &str,
-    [lower, upper]: [f64; 2],
-    accepted: Interval,
-    kind: &PlausibleRange,
-    violations: &mut Violations,
-) {
-    if known_wrong(path, violations) {
-        return;
-    }
-    for (name, value) in [("lower", lower), ("upper", upper)] {
-        if !accepted.contains(value) {
-            violations.add(path, format!("the {name} bound {}", accepted.refusal(value)));
-        }
-    }
-    if violations.has_at_or_below(path) {
-        return;
-    }
-    if lower >= upper {
-        let [lower, upper] = [lower, upper].map(written);
-        let message = format!("the lower bound {lower} must be below the upper {upper}");
-        violations.add(path, message);
-    } else if let Some(question) = kind.question(&[lower, upper], accepted) {
-        let asked_for = kind.asked_for();
-        violations.add(path, format!("are {lower:?} and {upper:?}; {asked_for}: {question}"));
-    }
-}
-
 /// Checks that the mean model of the first point is admissible, if each of its constants is valid
 /// by itself.
 fn admissible_start(specification: &JobSpecification, violations: &mut Violations) {
@@ -121,7 +76,7 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
         known_wrong(&format!("parameters.{}.{key}", parameter.name()), violations)
     };
     let independent = [Parameter::Density, Parameter::Dispersion];
-    let mut constants = Parameter::ALL.iter().filter(|name| !independent.contains(name));
+    let mut constants = Parameter::OF_BONE.iter().filter(|name| !independent.contains(name));
     if constants.any(wrong) {
         return;
     }
@@ -153,7 +108,7 @@ fn something_to_search(specification: &JobSpecification, violations: &mut Violat
     {
         violations.add(
             "parameters",
-            "all seven are fixed; an identification searches at least one: give it start and bounds \
+            "all are fixed; an identification searches at least one: give it start and bounds \
              (a run at fixed parameters is a propagation)",
         );
     }

@@ -8,14 +8,15 @@
 use super::weights::MomentWeights;
 use crate::conclusions::Profile;
 use crate::job::{JobSpecification, Range};
-use crate::parameters::{Parameter, Point};
+use crate::parameters::{PARAMETERS, Parameter, Point};
 use crate::results::Moments;
 
 /// Number of points of a profile, from bound to bound.
 pub const PROFILE_POINTS: usize = 11;
 
 /// Returns the profile of each free parameter, given the best point and its moments: of χ² with
-/// `weights`, and of the sum of relative squares without.
+/// `weights`, and of the sum of relative squares without. There are none if a parameter of the setup is
+/// free, which the approximation does not contain.
 pub fn profiles(
     specification: &JobSpecification,
     best: &Point,
@@ -25,6 +26,9 @@ pub fn profiles(
 ) -> Vec<Profile> {
     let free =
         |parameter: &Parameter| matches!(specification.range(*parameter), Range::Free { .. });
+    if Parameter::OF_SETUP.iter().any(free) {
+        return Vec::new();
+    }
     let profile = |parameter: Parameter| {
         let Range::Free { lower, upper, .. } = specification.range(parameter) else {
             return Profile { parameter, values: Vec::new(), costs: Vec::new() };
@@ -45,7 +49,7 @@ pub fn profiles(
 
 /// Returns the lowest cost over the box of these ranges, given the moments of model and data.
 fn lowest_cost(
-    ranges: &[Range; 7],
+    ranges: &[Range; PARAMETERS],
     best: &Point,
     [model, data]: [Moments; 2],
     weights: Option<&MomentWeights>,
@@ -81,7 +85,7 @@ fn relative_square(ratio: f64) -> f64 {
 /// c1111 = e_L / (1 - r) with r = 2 e_T ν_L² / (e_L (1 - ν_T)) grows with e_T, with ν_T and with
 /// |ν_L|, and has its minimum over e_L at r = ½; it grows without bound as r approaches 1, the edge
 /// of admissibility.
-fn squared_velocities(ranges: &[Range; 7]) -> Option<[f64; 2]> {
+fn squared_velocities(ranges: &[Range; PARAMETERS]) -> Option<[f64; 2]> {
     let of = |parameter: Parameter| ends(ranges[parameter as usize]);
     let density = of(Parameter::Density);
     let young = of(Parameter::LongitudinalYoungModulus);

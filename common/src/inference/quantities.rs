@@ -85,7 +85,10 @@ impl Quantities<'_> {
                 Parameter::Density
                 | Parameter::LongitudinalYoungModulus
                 | Parameter::LongitudinalShearModulus
-                | Parameter::TransverseYoungModulus => {
+                | Parameter::TransverseYoungModulus
+                | Parameter::BoneThickness
+                | Parameter::BoneQualityFactor
+                | Parameter::CouplingSoundSpeed => {
                     self.of_logarithm(value, &self.along(parameter, free, 1.0 / value))
                 }
             };

@@ -3,7 +3,7 @@
 
 use crate::conclusions::{Solution, Spread, Spreads};
 use crate::elasticity::Elasticity;
-use crate::parameters::{Parameter, Point};
+use crate::parameters::Point;
 use crate::results::Evaluation;
 
 /// Returns the best point of each start of set number `set` that found a feasible one.
@@ -35,11 +35,10 @@ pub fn spread(points: &[Point]) -> Option<Spreads> {
         }
         spread
     };
-    if points.is_empty() {
-        return None;
-    }
-    let parameters =
-        Parameter::ALL.map(|parameter| of(&mut points.iter().map(|point| point.get(parameter))));
+    let first = points.first()?;
+    let of_parameter =
+        |(parameter, _)| (parameter, of(&mut points.iter().map(|point| point.get(parameter))));
+    let parameters = first.given().map(of_parameter).collect();
     // Points that were evaluated are always admissible.
     let matrices: Vec<Elasticity> =
         points.iter().filter_map(|point| point.constants().elasticity().ok()).collect();

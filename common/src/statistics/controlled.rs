@@ -131,7 +131,8 @@ mod tests {
     use crate::outcome::FailureKind;
     use crate::statistics::{estimate, moments};
 
-    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    const OPTIMUM: Point =
+        Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
     fn asked(seed: u64) -> MonteCarlo {
         MonteCarlo { seed, control_variate: true, ..MonteCarlo::default() }

@@ -135,7 +135,7 @@ mod tests {
     use crate::outcome::FailureKind;
     use crate::statistics::moments;
 
-    const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+    const POINT: Point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
 
     /// Velocities that are a parabola of the speed; realizations with a speed below `least` failed.
     fn outcomes(count: u64, least: f64) -> (Vec<f64>, Vec<Outcome>) {

@@ -13,10 +13,10 @@ use crate::core::dispute::Contradiction;
 pub enum RunFailure {
     /// Two answers for one index differ, and no third worker can decide between them.
     #[error(
-        "integrity error: realization {} at the point {:?} is {} by {} and {} by {}; one of them \
+        "integrity error: realization {} at the point {} is {} by {} and {} by {}; one of them \
          computes wrongly, and there was no third worker to decide: attach three workers and \
          submit the job again, or run it on each machine alone and compare the digests",
-        contradiction.index, point.0,
+        contradiction.index, point,
         shown(contradiction.answers[0].1), contradiction.answers[0].0,
         shown(contradiction.answers[1].1), contradiction.answers[1].0
     )]

@@ -222,6 +222,7 @@ impl State {
             setup: specification.setup,
             point: evaluation.point,
             germs: specification.monte_carlo.germs(),
+            random: specification.random,
         };
         Some(Work {
             evaluation: Arc::new(shared),

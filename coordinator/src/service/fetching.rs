@@ -389,7 +389,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn draws_follow_the_realizations_in_blocks_that_follow_each_other() {
         let draw = PosteriorDraw {
-            point: Point([1.0; 7]),
+            point: Point::of_bone([1.0; 7]),
             log_density: -1.5,
             mean: 3900.0,
             coefficient_of_variation: 0.03,

@@ -138,6 +138,7 @@ mod tests {
     use osteon_common::case::Setup;
     use osteon_common::germ_source::GermSource;
     use osteon_common::parameters::Point;
+    use osteon_common::random_quantities::RandomQuantities;
     use osteon_proto::announced::{EVALUATIONS_KEPT_MAX, Received};
     use osteon_proto::evaluation::EvaluationInput;
 
@@ -145,8 +146,13 @@ mod tests {
 
     fn work(id: u64) -> Work {
         let germs = GermSource::streams(id);
-        let evaluation =
-            EvaluationInput { id, setup: Setup::default(), point: Point([1.0; 7]), germs };
+        let evaluation = EvaluationInput {
+            id,
+            setup: Setup::default(),
+            point: Point::of_bone([1.0; 7]),
+            germs,
+            random: RandomQuantities::default(),
+        };
         Work { evaluation: Arc::new(evaluation), first: 0, count: 1 }
     }
 

@@ -9,6 +9,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
 use osteon_common::parameters::Point;
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, JobResult};
 use osteon_common::version::{self, Program, VERSION};
 use osteon_coordinator::core::effect::Record;
@@ -41,7 +42,12 @@ pub(crate) fn identification(
         kind: JobKind::Identification,
         setup: Setup::default(),
         data: Some(Data::from_moments(3906.0, 0.027)),
-        parameters: RANGES.map(|(start, lower, upper)| Range::Free { start, lower, upper }),
+        parameters: Range::of_bone(RANGES.map(|(start, lower, upper)| Range::Free {
+            start,
+            lower,
+            upper,
+        })),
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo {
             realizations,
             seed,
@@ -129,7 +135,7 @@ fn realization(work: &Work, index: u64) -> RealizationResult {
         return RealizationResult::failed(FailureKind::ALL[(noise / 29 % 5) as usize]);
     }
     let uniform = (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-    let [density, e_l, nu_l, _, e_t, nu_t, dispersion] = work.evaluation.point.0;
+    let [density, e_l, nu_l, _, e_t, nu_t, dispersion, ..] = work.evaluation.point.0;
     let margin = e_l * (1.0 - nu_t) - 2.0 * e_t * nu_l * nu_l;
     let c11 = e_l * e_l * (1.0 - nu_t) / margin;
     let velocity = 0.99 * (c11 / density).sqrt() * (1.0 + 0.92 * dispersion * uniform);
@@ -191,6 +197,7 @@ pub(crate) fn evaluation(
         id: 1,
         setup: specification.setup,
         point,
+        random: RandomQuantities::default(),
         germs: specification.monte_carlo.germs(),
     });
     let work = |first| Work { evaluation: Arc::clone(&evaluation), first, count: 1 };

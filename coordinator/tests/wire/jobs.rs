@@ -20,7 +20,7 @@ pub(crate) fn jobs() -> [(&'static str, JobSpecification); 4] {
         subjects: None,
     };
     let groups = vec![group("left", 3900.0, 360.0), group("right, \"distal\"", 3800.0, 420.0)];
-    let mut priors = [None; 7];
+    let mut priors = Search::default().priors;
     priors[0] = Some(Prior { value: 1650.0, weight: 1e-3 });
     let several = JobSpecification {
         data: Some(measured.clone()),

@@ -3,7 +3,7 @@
 use osteon_common::case::Setup;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, entries};
 use osteon_common::job::{PosteriorSettings, RunSettings};
-use osteon_common::parameters::Parameter;
+use osteon_common::parameters::{BONE_PARAMETERS, Parameter};
 
 use crate::toml_text;
 
@@ -21,8 +21,18 @@ pub fn job_table() -> String {
     let special = |path: &str, keys: &[Key]| -> String {
         keys.iter().map(|key| row(&format!("{path}.{}", key.name), "", "", key.meaning)).collect()
     };
-    let names = Parameter::ALL.map(|parameter| format!("`{}`", parameter.name())).join(", ");
-    let each = format!("either `start` and `bounds`, or `fixed`, for each of {names}");
+    let names = |parameters: &[Parameter]| {
+        let quoted: Vec<_> =
+            parameters.iter().map(|parameter| format!("`{}`", parameter.name())).collect();
+        quoted.join(", ")
+    };
+    let (of_bone, of_setup) = Parameter::ALL.split_at(BONE_PARAMETERS);
+    let each = format!(
+        "either `start` and `bounds`, or `fixed`, for each of {}; to search a quantity of the setup, \
+         `bounds` for {}",
+        names(of_bone),
+        names(of_setup)
+    );
     let section = PosteriorSettings::KEY;
     let mut settings = RunSettings::default();
     let declared = settings.sections().map(|(key, section)| rows(key.name, &entries(section)));

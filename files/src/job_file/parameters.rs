@@ -2,32 +2,39 @@
 
 use std::slice;
 
+use osteon_common::case::Setup;
 use osteon_common::fields::Key;
 use osteon_common::job::Range;
-use osteon_common::parameters::Parameter;
+use osteon_common::parameters::{PARAMETERS, Parameter};
 
 use crate::reader::{Reader, Table};
 
 /// The keys of a range.
 pub(super) const KEYS: [Key; 3] = [
-    Key { name: "start", meaning: "value at which the search starts, within the bounds" },
+    Key {
+        name: "start",
+        meaning: "value at which the search starts, within the bounds; for a quantity of the setup by default its value there",
+    },
     Key { name: "bounds", meaning: "`[lower, upper]` of a free parameter" },
     Key { name: "fixed", meaning: "instead of both: the value of a parameter that is held fixed" },
 ];
 
-/// Returns the seven ranges. If one is missing or wrong, this is recorded, and the range has no
-/// meaning.
-pub(super) fn read(reader: &mut Reader, root: &Table<'_>) -> [Range; 7] {
+/// Returns the ranges. If one is missing or wrong, this is recorded, and the range has no meaning.
+/// Parameters of the setup start at its values, unless a start is given.
+pub(super) fn read(reader: &mut Reader, root: &Table<'_>, setup: &Setup) -> [Range; PARAMETERS] {
     let table = reader.table(root, "parameters", &Parameter::ALL.map(Parameter::name));
     if !table.is_table() {
         if !root.has("parameters") {
-            let names = Parameter::ALL.map(Parameter::name).join(", ");
+            let names = Parameter::OF_BONE.map(Parameter::name).join(", ");
             let message = format!("is missing; it must have the seven tables {names}");
             reader.lacks("parameters", &["parameters".to_owned()], message);
         }
-        return [UNKNOWN; 7];
+        return [UNKNOWN; PARAMETERS];
     }
-    Parameter::ALL.map(|parameter| range(reader, &table, parameter))
+    Parameter::ALL.map(|parameter| match parameter.of_setup() {
+        Some(quantity) => searched(reader, &table, parameter, quantity.of(setup)),
+        None => range(reader, &table, parameter),
+    })
 }
 
 /// Placeholder for a range that could not be read; a violation is always recorded with it.
@@ -68,6 +75,33 @@ fn range(reader: &mut Reader, parameters: &Table<'_>, parameter: Parameter) -> R
             UNKNOWN
         }
     }
+}
+
+/// Reads the range of a parameter of the setup, which has this value there.
+fn searched(
+    reader: &mut Reader,
+    parameters: &Table<'_>,
+    parameter: Parameter,
+    in_setup: Option<f64>,
+) -> Range {
+    let key = parameter.name();
+    if !parameters.has(key) {
+        return Range::AS_IN_SETUP;
+    }
+    let table = reader.table(parameters, key, &[KEYS[0].name, KEYS[1].name]);
+    if !table.is_table() {
+        return UNKNOWN;
+    }
+    if !table.has("bounds") {
+        reader.missing(&table, "bounds", "[lower, upper], between which it is searched");
+    }
+    let start = match table.has("start") {
+        true => reader.number(&table, "start"),
+        // The checks require a value.
+        false => Some(in_setup.unwrap_or(f64::NAN)),
+    };
+    let [lower, upper] = bounds(reader, &table).unwrap_or([f64::NAN; 2]);
+    Range::Free { start: start.unwrap_or(f64::NAN), lower, upper }
 }
 
 const RANGE_FORMS: &str = "give either fixed, or start and bounds";

@@ -2,7 +2,7 @@
 
 use osteon_common::fields::Key;
 use osteon_common::job::Prior;
-use osteon_common::parameters::Parameter;
+use osteon_common::parameters::{PARAMETERS, Parameter};
 
 use crate::reader::{Reader, Table};
 
@@ -22,7 +22,7 @@ pub(super) const KEYS: [Key; 2] = [
 
 /// Reads a table `{ value, weight }` for each parameter that has one; numbers that cannot be read
 /// are recorded and become NaN.
-pub(super) fn read(reader: &mut Reader, search: &Table<'_>) -> [Option<Prior>; 7] {
+pub(super) fn read(reader: &mut Reader, search: &Table<'_>) -> [Option<Prior>; PARAMETERS] {
     let table = reader.table(search, "priors", &Parameter::ALL.map(Parameter::name));
     Parameter::ALL.map(|parameter| {
         if !table.has(parameter.name()) {

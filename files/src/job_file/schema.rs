@@ -130,7 +130,7 @@ fn each_parameter(schema: fn(Parameter) -> Json) -> Json {
 
 fn ranges() -> Json {
     let mut ranges = object(each_parameter(range));
-    ranges["required"] = Parameter::ALL.map(Parameter::name).to_vec().into();
+    ranges["required"] = Parameter::OF_BONE.map(Parameter::name).to_vec().into();
     ranges
 }
 
@@ -145,9 +145,17 @@ fn range(parameter: Parameter) -> Json {
             (fixed_key.name, described(value(), fixed_key)),
         ]
     };
-    let required = [json!({ "required": [start.0, bounds.0] }), json!({ "required": [fixed.0] })];
-    let mut range = object(json!({ start.0: start.1, bounds.0: bounds.1, fixed.0: fixed.1 }));
-    range["oneOf"] = required.to_vec().into();
+    let range = if parameter.of_setup().is_some() {
+        let mut range = object(json!({ start.0: start.1, bounds.0: bounds.1 }));
+        range["required"] = json!([bounds.0]);
+        range
+    } else {
+        let required =
+            [json!({ "required": [start.0, bounds.0] }), json!({ "required": [fixed.0] })];
+        let mut range = object(json!({ start.0: start.1, bounds.0: bounds.1, fixed.0: fixed.1 }));
+        range["oneOf"] = required.to_vec().into();
+        range
+    };
     described(range, Key { name: parameter.name(), meaning: meaning(parameter) })
 }
 
@@ -184,6 +192,9 @@ fn meaning(parameter: Parameter) -> &'static str {
         Parameter::TransverseYoungModulus => "transverse Young modulus, Pa",
         Parameter::TransversePoissonRatio => "transverse Poisson ratio",
         Parameter::Dispersion => "dispersion of the random elasticity",
+        Parameter::BoneThickness => "thickness of the bone, m",
+        Parameter::BoneQualityFactor => "quality factor of the bone",
+        Parameter::CouplingSoundSpeed => "speed of sound of the coupling layer, m/s",
     }
 }
 

@@ -26,7 +26,7 @@ pub struct Identified {
     /// Dispersion of the elasticity, with the other parameters held as found.
     pub dispersion: QuantityEstimate,
     /// The free parameters in their units; null where a direction is left free, because then no single
-    /// parameter is known.
+    /// parameter is known, and where the bounds may contain a second value with the same velocity.
     #[schemars(transform = keyed_by_parameter)]
     pub parameters: BTreeMap<Parameter, Option<QuantityEstimate>>,
     /// Directions of the box that the data fix.
@@ -180,7 +180,7 @@ impl From<&osteon_common::inference::Spreads> for Spreads {
             (format!("{}{}", row + 1, column + 1), *spread)
         };
         Self {
-            parameters: Parameter::ALL.into_iter().zip(spreads.parameters).collect(),
+            parameters: spreads.parameters.iter().copied().collect(),
             mandel: spreads.entries.iter().map(entry).collect(),
         }
     }

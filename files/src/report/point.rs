@@ -1,6 +1,6 @@
 //! The mean model at a point.
 
-use osteon_common::parameters::{Parameter, Point};
+use osteon_common::parameters::{AS_IN_SETUP, Parameter, Point};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +19,15 @@ pub struct MeanModel {
     pub transverse_young_modulus: Option<f64>,
     /// Transverse Poisson ratio.
     pub transverse_poisson_ratio: Option<f64>,
+    /// Thickness of the bone, m; only if it was searched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bone_thickness: Option<f64>,
+    /// Quality factor of the bone; only if it was searched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bone_quality_factor: Option<f64>,
+    /// Speed of sound of the coupling layer, m/s; only if it was searched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coupling_sound_speed: Option<f64>,
 }
 
 impl MeanModel {
@@ -32,6 +41,9 @@ impl MeanModel {
             self.transverse_young_modulus?,
             self.transverse_poisson_ratio?,
             dispersion?,
+            self.bone_thickness.unwrap_or(AS_IN_SETUP),
+            self.bone_quality_factor.unwrap_or(AS_IN_SETUP),
+            self.coupling_sound_speed.unwrap_or(AS_IN_SETUP),
         ]))
     }
 }
@@ -39,6 +51,7 @@ impl MeanModel {
 impl From<&Point> for MeanModel {
     fn from(point: &Point) -> Self {
         let value = |parameter| super::finite_or_null(point.get(parameter));
+        let searched = |parameter| value(parameter).filter(|value| *value != AS_IN_SETUP);
         Self {
             density: value(Parameter::Density),
             longitudinal_young_modulus: value(Parameter::LongitudinalYoungModulus),
@@ -46,6 +59,9 @@ impl From<&Point> for MeanModel {
             longitudinal_shear_modulus: value(Parameter::LongitudinalShearModulus),
             transverse_young_modulus: value(Parameter::TransverseYoungModulus),
             transverse_poisson_ratio: value(Parameter::TransversePoissonRatio),
+            bone_thickness: searched(Parameter::BoneThickness),
+            bone_quality_factor: searched(Parameter::BoneQualityFactor),
+            coupling_sound_speed: searched(Parameter::CouplingSoundSpeed),
         }
     }
 }

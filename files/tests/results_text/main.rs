@@ -28,7 +28,7 @@ use osteon_files::document::Format;
 use osteon_files::report::{MeanModel, ReadError, ResultFile, Solver};
 use osteon_files::{job_file, results_csv};
 
-const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const POINT: Point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
 fn moments(mean: f64, coefficient_of_variation: f64) -> Moments {
     Moments { mean, coefficient_of_variation }
@@ -101,8 +101,8 @@ fn propagation_text(result: &JobResult) -> String {
 
 /// With every default.
 fn specification() -> JobSpecification {
-    let fixed =
-        Parameter::ALL.map(|name| format!("{} = {{ fixed = {:?} }}", name.name(), POINT.get(name)));
+    let fixed = Parameter::OF_BONE
+        .map(|name| format!("{} = {{ fixed = {:?} }}", name.name(), POINT.get(name)));
     let fixed =
         fixed.join("\n").replace("{ fixed = 0.1029 }", "{ start = 0.1, bounds = [0.02, 0.3] }");
     let text = format!(
@@ -263,7 +263,8 @@ fn what_is_not_finite_is_null() {
 #[test]
 fn the_best_point_is_read_back_to_the_bit() {
     let mut result = result();
-    let odd = Point([1.0 / 3.0, 1e10 / 7.0, -0.1, f64::MIN_POSITIVE, 1e300 / 3.0, 5e-324, 0.1]);
+    let odd =
+        Point::of_bone([1.0 / 3.0, 1e10 / 7.0, -0.1, f64::MIN_POSITIVE, 1e300 / 3.0, 5e-324, 0.1]);
     for point in [POINT, odd] {
         result.best.as_mut().unwrap().point = point;
         let read = best_point(&identified(&result)).unwrap();

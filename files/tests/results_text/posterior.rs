@@ -183,7 +183,14 @@ fn the_columns_are_documented() {
     let rows = section.unwrap().lines().filter(|line| line.starts_with("| `"));
     let cells: String = rows.filter_map(|line| line.split('|').nth(1)).collect();
     let told: Vec<&str> = cells.split('`').skip(1).step_by(2).collect();
-    let real: Vec<&str> = HEADER.split(',').chain(["group"]).collect();
+    // Quantities of the setup are columns if they are searched.
+    let groups = vec![Group::new("left", vec![3900.0, 3950.0])];
+    let mut job = JobSpecification { data: Some(Data::from_groups(groups)), ..specification() };
+    for parameter in Parameter::ALL.into_iter().filter(|one| one.of_setup().is_some()) {
+        job.parameters[parameter as usize] = Range::Free { start: 1.0, lower: 0.5, upper: 2.0 };
+    }
+    let text = posterior_csv::posterior(&job, &of_groups());
+    let real: Vec<&str> = text.lines().next().unwrap().split(',').collect();
     assert_eq!(told, real);
 }
 

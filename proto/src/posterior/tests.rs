@@ -98,7 +98,7 @@ fn complete() -> (v1::Posterior, Vec<PosteriorDraw>) {
         quantiles: [0.1, 0.2, 0.5, 1.0, 1.5, 1.8, 1.9],
         prior_standard_deviation: 1.0,
     };
-    let point = osteon_common::parameters::Point([1.0; 7]);
+    let point = osteon_common::parameters::Point::of_bone([1.0; 7]);
     let draw =
         PosteriorDraw { point, log_density: -2.0, mean: 3900.0, coefficient_of_variation: 0.03 };
     let posterior = Posterior {

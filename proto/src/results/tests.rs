@@ -11,7 +11,7 @@ use osteon_common::inference::{
 };
 use osteon_common::job::{Prior, Sampling, SearchMethod};
 use osteon_common::moments::{ConfidenceInterval, MomentIntervals, Outlier};
-use osteon_common::parameters::{Parameter, Point};
+use osteon_common::parameters::{AS_IN_SETUP, BONE_PARAMETERS, Parameter, Point};
 use osteon_common::results::{DataSummary, JobFailure, PointMeaning, Status};
 
 /// Any number, including both zeros, infinities and subnormal numbers.
@@ -45,7 +45,15 @@ fn cost() -> impl Strategy<Value = Option<f64>> {
 }
 
 pub(crate) fn point() -> impl Strategy<Value = Point> {
-    proptest::array::uniform7(-1e12..1e12).prop_map(Point)
+    let of_bone = proptest::array::uniform7(-1e12..1e12);
+    let searched = proptest::array::uniform3(proptest::option::of(1e-3..1e12));
+    (of_bone, searched).prop_map(|(of_bone, searched)| {
+        let mut point = Point::of_bone(of_bone);
+        for (value, found) in point.0[BONE_PARAMETERS..].iter_mut().zip(searched) {
+            *value = found.unwrap_or(AS_IN_SETUP);
+        }
+        point
+    })
 }
 
 prop_compose! {
@@ -179,7 +187,7 @@ prop_compose! {
         points in proptest::collection::vec((any::<u32>(), point(), number(), any::<u64>()), 0..4),
         matching: u64,
         spreads in proptest::option::of((
-            proptest::array::uniform7(spread().boxed()),
+            proptest::collection::vec(spread(), 7..=10),
             proptest::collection::vec((0_usize..6, 0_usize..6, spread()), 0..21),
         )),
     ) -> Solutions {
@@ -188,6 +196,7 @@ prop_compose! {
         let points = points.into_iter().map(solution).collect();
         let spread = spreads.map(|(parameters, entries)| {
             let upper = |(i, j, spread): (usize, usize, Spread)| (i.min(j), i.max(j), spread);
+            let parameters = Parameter::ALL.into_iter().zip(parameters).collect();
             Spreads { parameters, entries: entries.into_iter().map(upper).collect() }
         });
         Solutions { points, matching, spread }
@@ -198,7 +207,7 @@ prop_compose! {
     fn conclusions()(
         inference in proptest::option::of(inference().boxed()),
         profiles in proptest::collection::vec(
-            (0_usize..7, proptest::collection::vec((number(), number()), 0..12)), 0..7),
+            (0..Parameter::ALL.len(), proptest::collection::vec((number(), number()), 0..12)), 0..7),
         solutions in proptest::option::of(solutions().boxed()),
         posterior in proptest::option::of(posterior().boxed()),
     ) -> Conclusions {
@@ -215,7 +224,7 @@ prop_compose! {
         method in proptest::sample::select(SearchMethod::ALL.to_vec()),
         starts: u64,
         sensitivities: bool,
-        priors in proptest::array::uniform7(proptest::option::of((number(), number()))),
+        priors in proptest::array::uniform10(proptest::option::of((number(), number()))),
     ) -> Search {
         let priors = priors.map(|prior| prior.map(|(value, weight)| Prior { value, weight }));
         Search { starts, sensitivities, priors, ..Search::by(method) }
@@ -370,7 +379,10 @@ fn complete() -> v1::JobResult {
         solutions: Some(Solutions {
             points: Vec::new(),
             matching: 1,
-            spread: Some(Spreads { parameters: [spread; 7], entries: vec![(0, 5, spread)] }),
+            spread: Some(Spreads {
+                parameters: Parameter::OF_BONE.map(|parameter| (parameter, spread)).to_vec(),
+                entries: vec![(0, 5, spread)],
+            }),
         }),
         posterior: None,
     };
@@ -446,10 +458,10 @@ fn the_ending_of_a_group_survives() {
     assert_eq!(group_ending_from_message(&message), Ok(ending));
     let missing = v1::GroupEnding { status: 0, ..message };
     assert_eq!(group_ending_from_message(&missing), Err(Malformed::Missing { field: "status" }));
-    let point = Some(point_to_message(&Point([1.0; 7])));
-    let row = v1::EvaluationRow { point, varied: Some(8), ..v1::EvaluationRow::default() };
+    let point = Some(point_to_message(&Point::of_bone([1.0; 7])));
+    let row = v1::EvaluationRow { point, varied: Some(11), ..v1::EvaluationRow::default() };
     assert_eq!(
         evaluation_from_message(&row),
-        Err(Malformed::UnknownValue { field: "varied", value: 8 })
+        Err(Malformed::UnknownValue { field: "varied", value: 11 })
     );
 }

@@ -1,20 +1,19 @@
 use std::path::Path;
 
 use osteon_common::case::Setup;
-use osteon_common::job::{
-    PosteriorPrior, PosteriorSettings, PriorDistribution, Sampling, SearchMethod,
-};
-use osteon_common::moments::Moments;
-use osteon_common::settings::{Method, SolverSettings};
+use osteon_common::job::SearchMethod;
+use osteon_common::settings::Method;
 use osteon_files::document::Format;
 use osteon_files::job_file;
 use osteon_fuzz::properties;
 use proptest::prelude::*;
 
+use self::random_specifications::specification;
 use super::*;
 
 mod objective;
 mod posterior;
+mod random_specifications;
 
 /// The paper's search box, with all parameters free.
 const RANGES: [(f64, f64, f64); 7] = [
@@ -26,173 +25,6 @@ const RANGES: [(f64, f64, f64); 7] = [
     (0.4, 0.2, 0.5),
     (0.1, 0.02, 0.3),
 ];
-
-fn parameters() -> impl Strategy<Value = [Range; 7]> {
-    proptest::array::uniform7((any::<bool>(), 0.0..1.0)).prop_map(|choices| {
-        std::array::from_fn(|i| {
-            let (start, lower, upper) = RANGES[i];
-            let (fixed, shift) = choices[i];
-            let value = start + 0.01 * shift * (upper - lower);
-            // An identification needs at least one free parameter.
-            if fixed && i < 6 {
-                Range::Fixed(value)
-            } else {
-                Range::Free { start: value, lower, upper }
-            }
-        })
-    })
-}
-
-fn data() -> impl Strategy<Value = Data> {
-    let noise = (any::<bool>(), 2_usize..9, 0.0..0.9);
-    let exact = prop_oneof![
-        // The fixed first value keeps the velocities from being all equal.
-        proptest::collection::vec(2000.0..6000.0, 1..20).prop_map(|mut velocities| {
-            velocities.insert(0, 1999.0);
-            Data::from_velocities(velocities)
-        }),
-        proptest::collection::vec("[a-zβ ]{1,9}", 1..5).prop_map(|names| {
-            let group = |(i, name): (usize, &String)| Group {
-                name: format!("{name}{i}"),
-                velocities: vec![1999.0, 2000.0 + i as f64],
-                subjects: None,
-            };
-            Data::from_groups(names.iter().enumerate().map(group).collect())
-        }),
-        (2000.0..6000.0, 0.002..0.4).prop_map(|(mean, coefficient_of_variation)| {
-            Data::from_moments(mean, coefficient_of_variation)
-        }),
-    ];
-    (exact, noise).prop_map(|(data, noise)| with_noise(data, noise))
-}
-
-/// Adds what may be known of the noise, by chance.
-fn with_noise(mut data: Data, (known, few, part): (bool, usize, f64)) -> Data {
-    if !known {
-        return data;
-    }
-    let numbers = |count: usize| Some(numbered((0..count).map(|k| (k * k) % few)));
-    let smallest = (0..data.sets()).map(|set| {
-        let Moments { mean, coefficient_of_variation } = data.moments(set);
-        mean * coefficient_of_variation
-    });
-    data.repeatability = part * smallest.fold(f64::INFINITY, f64::min);
-    match &mut data.measurements {
-        Measurements::Velocities { velocities, subjects } => *subjects = numbers(velocities.len()),
-        Measurements::Groups(groups) => {
-            for group in groups.iter_mut().step_by(2) {
-                group.subjects = numbers(group.velocities.len());
-            }
-        }
-        Measurements::Moments { count, .. } => *count = Some(few as u64),
-    }
-    data
-}
-
-/// Adds a number of velocities to moments without one, as a posterior needs it.
-fn counted(mut data: Data) -> Data {
-    if let Measurements::Moments { count, .. } = &mut data.measurements {
-        count.get_or_insert(9);
-    }
-    data
-}
-
-fn setup() -> impl Strategy<Value = Setup> {
-    let exact = (0.5..1.5, proptest::option::of(2.0..99.0)).prop_map(|(refinement, quality)| {
-        let mut setup = Setup::default();
-        setup.solver.refinement = refinement;
-        setup.layers.bone_attenuation.quality_factor = quality;
-        (setup.probe.tilt, setup.probe.bidirectional) = (-0.02 * refinement, quality.is_some());
-        setup
-    });
-    let hybrid = (1e-4..1e-3, 2_u32..=12, proptest::option::of(1e-9..1e-7)).prop_map(
-        |(element_size, element_order, time_step)| SolverSettings {
-            method: Method::Hybrid,
-            refinement: 1.0,
-            element_size,
-            element_order,
-            time_step,
-        },
-    );
-    let hybrid = hybrid.prop_map(|solver| Setup { solver, ..Setup::default() });
-    prop_oneof![exact, hybrid]
-}
-
-prop_compose! {
-    /// With the centers of priors at the starts of the paper's search box.
-    fn posterior()(
-        draws in 100_u64..=20_000,
-        max_evaluations in 20_u64..=2_000,
-        laws in proptest::array::uniform7(
-            (proptest::sample::select(PriorDistribution::ALL.to_vec()), 0.01..1.0)),
-    ) -> PosteriorSettings {
-        let prior = |i: usize| PosteriorPrior::new(laws[i].0, RANGES[i].0, laws[i].1 * RANGES[i].0);
-        PosteriorSettings { draws, max_evaluations, priors: std::array::from_fn(prior) }
-    }
-}
-
-prop_compose! {
-    fn specification()(
-        data in proptest::option::of(data()),
-        parameters in parameters(),
-        points in 2_u64..=9765,
-        scrambles in proptest::option::of(1_u64..=1024),
-        control_variate: bool,
-        seed in 0..1_u64 << 63,
-        max_failed_fraction in 0.0..1.0,
-        method in proptest::sample::select(SearchMethod::ALL.to_vec()),
-        max_evaluations in 1_u64..1000,
-        initial_step in 0.01..0.5,
-        starts in 1_u64..100,
-        first_start in 0_u64..=1000,
-        sensitivities: bool,
-        weights in proptest::array::uniform7(proptest::option::of(1e-9..1.0)),
-        setup in setup(),
-        posterior in proptest::option::of(posterior()),
-    ) -> JobSpecification {
-        let needs_noise = posterior.is_some() || method == SearchMethod::Posterior;
-        let data = data.map(|data| if needs_noise { counted(data) } else { data });
-        let posterior = posterior.filter(|_| data.is_some()).map(|mut posterior| {
-            for (prior, range) in posterior.priors.iter_mut().zip(&parameters) {
-                if matches!(range, Range::Fixed(_)) {
-                    *prior = PosteriorPrior::Uniform;
-                }
-            }
-            posterior
-        });
-        let mut priors = [None; 7];
-        for ((prior, weight), range) in priors.iter_mut().zip(weights).zip(&parameters) {
-            let drawn = matches!(range, Range::Free { .. }) && method == SearchMethod::Simplex;
-            *prior = weight.filter(|_| drawn).map(|weight| Prior { value: range.start(), weight });
-        }
-        let specification = JobSpecification {
-            kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
-            setup,
-            data,
-            parameters,
-            monte_carlo: MonteCarlo {
-                realizations: points * scrambles.unwrap_or(1),
-                seed,
-                sampling: scrambles.map_or(Sampling::MonteCarlo, |_| Sampling::Sobol),
-                scrambles: scrambles.unwrap_or(1),
-                control_variate,
-                max_failed_fraction,
-            },
-            objective: Objective::default(),
-            search: Search {
-                max_evaluations,
-                initial_step,
-                starts,
-                first_start,
-                sensitivities,
-                priors,
-                ..Search::by(method)
-            },
-            posterior,
-        };
-        specification.with_implied(Omitted::default())
-    }
-}
 
 properties! {
     fn specifications_survive_the_wire(specification in specification()) {
@@ -210,7 +42,8 @@ fn message() -> v1::JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
         data: Some(Data::from_moments(3906.0, 0.027)),
-        parameters: std::array::from_fn(free),
+        parameters: Range::of_bone(std::array::from_fn(free)),
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),
@@ -468,7 +301,7 @@ fn minimal(kind: JobKind, search: SearchMethod, solver: Method) -> [JobSpecifica
             Some(v1::Data { mean, coefficient_of_variation, count, ..v1::Data::default() });
     }
     text.push_str("[parameters]\n");
-    let ranges = Parameter::ALL.map(|parameter| {
+    let ranges = Range::of_bone(Parameter::OF_BONE.map(|parameter| {
         let (name, (start, lower, upper)) = (parameter.name(), RANGES[parameter as usize]);
         if free(parameter) {
             text.push_str(&format!(
@@ -479,7 +312,7 @@ fn minimal(kind: JobKind, search: SearchMethod, solver: Method) -> [JobSpecifica
             text.push_str(&format!("{name} = {{ fixed = {start:?} }}\n"));
             Range::Fixed(start)
         }
-    });
+    }));
     message.parameters = Some(parameters_to_message(&ranges));
     let of_file = job_file::parse(&text, Format::Toml, Path::new(""), kind).unwrap();
     [of_file, from_message(&message).unwrap()]

@@ -6,13 +6,15 @@ use osteon_common::case::Setup;
 use osteon_common::job::{
     Data, Group, JobKind, MonteCarlo, Objective, Range, Search as SearchSettings, SearchMethod,
 };
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, Status};
 
 use super::*;
 
 /// Only e_L and the dispersion are free.
 fn specification(data: Data, method: SearchMethod) -> JobSpecification {
-    let mut parameters = [1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
+    let mut parameters =
+        Range::of_bone([1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed));
     parameters[1] = Range::Free { start: 15e9, lower: 12e9, upper: 25e9 };
     parameters[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
     JobSpecification {
@@ -20,6 +22,7 @@ fn specification(data: Data, method: SearchMethod) -> JobSpecification {
         setup: Setup::default(),
         data: Some(data),
         parameters,
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo { realizations: 50, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations: 60, ..SearchSettings::by(method) },

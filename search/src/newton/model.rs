@@ -14,6 +14,7 @@
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::ensemble::Germs;
 use osteon_common::inference::MomentWeights;
+use osteon_common::parameters::{PARAMETERS, Parameter};
 
 use crate::search_box::{SearchBox, admissible};
 
@@ -284,8 +285,8 @@ fn closed_form(space: &SearchBox, at: &[f64]) -> Option<(Logarithms, Rows)> {
     let point = space.point(at);
     let velocity = bulk_velocity(&point).ok()?;
     let dispersion = point.dispersion();
-    let mut of_dispersion = [0.0; 7];
-    of_dispersion[6] = 1.0 / dispersion;
+    let mut of_dispersion = [0.0; PARAMETERS];
+    of_dispersion[Parameter::Dispersion as usize] = 1.0 / dispersion;
     let rows = [space.per_edge(&velocity.gradient), space.per_edge(&of_dispersion)];
     (dispersion > 0.0).then(|| ([velocity.logarithm, libm::log(dispersion)], rows))
 }

@@ -4,7 +4,7 @@
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::ensemble::Germs;
 use osteon_common::job::Range;
-use osteon_common::parameters::Point;
+use osteon_common::parameters::{Parameter, Point};
 use osteon_common::statistics;
 use osteon_fuzz::properties;
 use proptest::prelude::*;
@@ -27,21 +27,22 @@ const BOUNDS: [(f64, f64); 7] = [
     (0.2, 0.5),
     (0.02, 0.3),
 ];
-const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const OPTIMUM: Point =
+    Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
 /// A box in which all seven parameters are free; the start is given in units of the box.
 fn all_free(start: &[f64; 7]) -> SearchBox {
     let mut start = start.iter();
-    SearchBox::new(BOUNDS.map(|(lower, upper)| {
+    SearchBox::new(Range::of_bone(BOUNDS.map(|(lower, upper)| {
         let u = start.next().copied().unwrap_or_default();
         Range::Free { start: lower + u * (upper - lower), lower, upper }
-    }))
+    })))
 }
 
 /// A box in which only `free` are free, starting in the middle of their bounds; the others are the
 /// optimum's.
 fn some_free(free: &[usize]) -> SearchBox {
-    let ranges = std::array::from_fn(|i| {
+    let ranges = Range::of_bone(std::array::from_fn(|i| {
         let (lower, upper) = BOUNDS[i];
         let start = 0.5 * (lower + upper);
         if free.contains(&i) {
@@ -49,7 +50,7 @@ fn some_free(free: &[usize]) -> SearchBox {
         } else {
             Range::Fixed(OPTIMUM.0[i])
         }
-    });
+    }));
     SearchBox::new(ranges)
 }
 
@@ -294,6 +295,28 @@ fn one_elastic_parameter_and_the_dispersion_are_found_again() {
         assert!((point.0[axis] / OPTIMUM.0[axis] - 1.0).abs() < 1e-4, "{axis}: {found:?}");
         assert!((point.0[6] / OPTIMUM.0[6] - 1.0).abs() < 1e-4, "{axis}: {found:?}");
     }
+}
+
+/// The closed form knows nothing of a thickness: what it does is measured at the first point.
+#[test]
+fn a_thickness_and_the_dispersion_are_found_in_a_few_evaluations() {
+    let mut ranges = OPTIMUM.0.map(Range::Fixed);
+    ranges[6] = Range::Free { start: 0.16, lower: 0.02, upper: 0.3 };
+    ranges[Parameter::BoneThickness as usize] =
+        Range::Free { start: 1.1e-3, lower: 0.6e-3, upper: 1.6e-3 };
+    let space = SearchBox::new(ranges);
+    let plate = |point: &Point| {
+        let thickness = point.get(Parameter::BoneThickness);
+        let Moments { mean, coefficient_of_variation } = bone(point);
+        Moments { mean: mean * libm::pow(thickness / 4e-3, 0.1), coefficient_of_variation }
+    };
+    let mut truth = OPTIMUM;
+    truth.0[Parameter::BoneThickness as usize] = 0.83e-3;
+    let found = search(space, plate(&truth), SETTINGS, |point| Some(plate(point)));
+    assert_eq!(found.stop, StopReason::CostReached, "{found:?}");
+    assert!(found.evaluations <= 8, "{found:?}");
+    let thickness = space.point(&found.at).get(Parameter::BoneThickness);
+    assert!((thickness / 0.83e-3 - 1.0).abs() < 1e-4, "{found:?}");
 }
 
 #[test]

@@ -7,19 +7,21 @@
 //! velocities) at a twentieth of the test points in these, and by more than 0.7 in the ratios.
 
 use osteon_common::bulk_velocity::bulk_velocity;
-use osteon_common::parameters::Point;
+use osteon_common::parameters::{AS_IN_SETUP, PARAMETERS, Point};
 
 /// Number of features.
-pub(super) const FEATURES: usize = 7;
+pub(super) const FEATURES: usize = PARAMETERS;
 
 /// Features of a point, in their natural scale.
 pub(super) type Features = [f64; FEATURES];
 
 /// Returns c3333/c1111, c1133/c1111, g_L/c1111, ln ρ, c2233/c3333, ln(c1111/ρ) and
-/// ln δ of the mean model at a point; `None` where it is not admissible.
+/// ln δ of the mean model at a point, and the logarithms of the parameters of the setup, or 0 if they
+/// are not searched; `None` where the model is not admissible.
 pub(super) fn features(point: &Point) -> Option<Features> {
     let velocity = bulk_velocity(point).ok()?;
-    let [density, e_l, nu_l, g_l, e_t, nu_t, dispersion] = point.0;
+    let [density, e_l, nu_l, g_l, e_t, nu_t, dispersion, of_setup @ ..] = point.0;
+    let of_setup = of_setup.map(|value| if value == AS_IN_SETUP { 0.0 } else { libm::log(value) });
     // Entries of the inverse of the compliance, with the axis of symmetry 1, over common factors.
     let ratio = e_t / e_l * (nu_l * nu_l);
     let margin = 1.0 - nu_t - 2.0 * ratio;
@@ -28,6 +30,7 @@ pub(super) fn features(point: &Point) -> Option<Features> {
     let c13 = e_t * nu_l / margin;
     let c23 = e_t * (nu_t + ratio) / ((1.0 + nu_t) * margin);
     (dispersion > 0.0 && g_l > 0.0).then(|| {
+        let [thickness, quality, speed] = of_setup;
         [
             c33 / c11,
             c13 / c11,
@@ -36,17 +39,22 @@ pub(super) fn features(point: &Point) -> Option<Features> {
             c23 / c33,
             2.0 * velocity.logarithm,
             libm::log(dispersion),
+            thickness,
+            quality,
+            speed,
         ]
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use osteon_common::parameters::Parameter;
+
     use super::*;
 
     #[test]
     fn features_are_ratios_of_the_stiffness_matrix() {
-        let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+        let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
         let elasticity = point.constants().elasticity().unwrap();
         let rows = elasticity.rows();
         let expected = [
@@ -57,7 +65,12 @@ mod tests {
             rows[1][2] / rows[2][2],
             libm::log(rows[0][0] / 1598.8),
             libm::log(0.1029),
+            0.0,
+            libm::log(15.0),
+            0.0,
         ];
+        let mut point = point;
+        point.0[Parameter::BoneQualityFactor as usize] = 15.0;
         let found = features(&point).unwrap();
         for (found, expected) in found.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");

@@ -6,7 +6,7 @@
 //! the coefficient of variation, and another one for the mean velocity.
 
 use osteon_common::bulk_velocity::bulk_velocity;
-use osteon_common::parameters::{Parameter, Point};
+use osteon_common::parameters::{PARAMETERS, Parameter, Point};
 
 use super::prior::ParameterPrior;
 
@@ -26,10 +26,8 @@ impl Pivots {
     /// modulus is chosen only if there is no other, because up to two of its values give the same
     /// velocity.
     pub(super) fn choose(priors: &[ParameterPrior], at: &Point) -> Self {
-        let gradient = bulk_velocity(at).map_or([1.0; 7], |velocity| velocity.gradient);
-        let free = priors.iter().filter(|prior| {
-            !matches!(prior.parameter, Parameter::Dispersion | Parameter::LongitudinalShearModulus)
-        });
+        let gradient = bulk_velocity(at).map_or([1.0; PARAMETERS], |velocity| velocity.gradient);
+        let free = priors.iter().filter(|prior| is_in_closed_form(prior.parameter));
         let influence = |prior: &&ParameterPrior| {
             let whole = (gradient[prior.parameter as usize] * prior.middle_half()).abs();
             let last = prior.parameter == Parameter::LongitudinalYoungModulus;
@@ -54,12 +52,18 @@ impl Pivots {
     }
 }
 
+/// Returns whether √(c1111/ρ) depends on a parameter.
+fn is_in_closed_form(parameter: Parameter) -> bool {
+    let others = [Parameter::Dispersion, Parameter::LongitudinalShearModulus];
+    parameter.of_setup().is_none() && !others.contains(&parameter)
+}
+
 /// Returns the value of `pivot` with which `point` has this ln √(c1111/ρ), by the paper's Eq. (7).
 /// Where there is none, c1111 is larger than wanted everywhere: then the value with which it is
 /// smallest, without regard to bounds. `None` if the point is not admissible with any density. Of two
 /// values `branch` 0 is the larger.
 pub(super) fn solve(point: &Point, pivot: Parameter, logarithm: f64, branch: usize) -> Option<f64> {
-    let [density, e_l, nu_l, _, e_t, nu_t, _] = point.0;
+    let [density, e_l, nu_l, _, e_t, nu_t, ..] = point.0;
     let stiffness = density * libm::exp(2.0 * logarithm);
     let (a, b) = (1.0 - nu_t, 2.0 * e_t * nu_l * nu_l);
     // c1111 = e_L² a / (e_L a - b).
@@ -77,7 +81,7 @@ pub(super) fn solve(point: &Point, pivot: Parameter, logarithm: f64, branch: usi
         Parameter::TransverseYoungModulus => wanted / (2.0 * nu_l * nu_l),
         Parameter::TransversePoissonRatio if stiffness <= e_l => -1.0,
         Parameter::TransversePoissonRatio => 1.0 - stiffness * b / (stiffness * e_l - e_l * e_l),
-        Parameter::LongitudinalShearModulus | Parameter::Dispersion => return None,
+        _ => return None,
     };
     value.is_finite().then_some(value)
 }
@@ -86,7 +90,8 @@ pub(super) fn solve(point: &Point, pivot: Parameter, logarithm: f64, branch: usi
 mod tests {
     use super::*;
 
-    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    const OPTIMUM: Point =
+        Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
     #[test]
     fn solutions_have_the_wanted_velocity() {

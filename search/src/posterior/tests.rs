@@ -10,6 +10,7 @@ use osteon_common::job::{
 };
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorSummary};
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::Moments;
 use osteon_common::special::standard_normal_quantile;
 
@@ -17,7 +18,8 @@ use super::features::features;
 use super::population::closed_form;
 use super::{PosteriorSearch, SearchOutcome, likelihood};
 
-const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const OPTIMUM: Point =
+    Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 const BOUNDS: [[f64; 2]; 7] = [
     [1500.0, 2000.0],
     [12e9, 25e9],
@@ -77,6 +79,7 @@ fn specification(
         setup: Setup::default(),
         data: Some(Data::from_velocities(velocities(&OPTIMUM, count))),
         parameters,
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::Moments,
         search: Search::default(),
@@ -194,7 +197,7 @@ fn two_parameters_have_the_posterior_of_quadrature() {
 fn seven_parameters_have_the_posterior_of_many_points_of_the_prior() {
     for model in [model, slow_model] {
         let data = with_moments(model(&OPTIMUM).unwrap(), 12);
-        let job = specification(&Parameter::ALL, 12, PosteriorSettings::default());
+        let job = specification(&Parameter::OF_BONE, 12, PosteriorSettings::default());
         check_with_points_of_the_prior(
             &JobSpecification { data: Some(Data::from_velocities(data)), ..job },
             model,
@@ -254,7 +257,7 @@ fn narrow_normal_priors_give_the_gaussian_formula() {
     for ((prior, center), spread) in settings.priors.iter_mut().zip(OPTIMUM.0).zip(spreads) {
         *prior = PosteriorPrior::Normal { center, spread };
     }
-    let specification = specification(&Parameter::ALL, 2747, settings);
+    let specification = specification(&Parameter::OF_BONE, 2747, settings);
     let found = posterior(&specification);
     assert!(found.converged, "{:?}", found.reason);
     let noise = likelihood(&specification, 0).unwrap().errors();
@@ -297,7 +300,7 @@ fn the_same_evaluations_give_the_same_bits() {
 #[test]
 fn too_few_evaluations_are_said() {
     let settings = PosteriorSettings { max_evaluations: 20, ..PosteriorSettings::default() };
-    let found = posterior(&specification(&Parameter::ALL, 2747, settings));
+    let found = posterior(&specification(&Parameter::OF_BONE, 2747, settings));
     assert!(!found.converged && found.evaluations <= 20, "{}", found.evaluations);
     assert!(found.reason.unwrap().contains("max_evaluations"));
 }

@@ -138,7 +138,7 @@ fn advice(specification: &JobSpecification, held_by_bounds: bool) -> String {
     let choices = [
         (specification.has_priors(), "lower the weights of [search.priors]"),
         (held_by_bounds, "widen the bounds"),
-        (Parameter::ALL.iter().any(is_fixed), "free more parameters"),
+        (Parameter::OF_BONE.iter().any(is_fixed), "free more parameters"),
     ];
     let choices: Vec<&str> =
         choices.into_iter().filter(|choice| choice.0).map(|choice| choice.1).collect();

@@ -6,6 +6,7 @@ use osteon_common::job::{
 };
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::realization::Ensemble;
 use osteon_common::results::Moments;
 
@@ -19,7 +20,8 @@ mod sets;
 
 /// Only e_L and the dispersion are free.
 fn specification(max_evaluations: u64) -> JobSpecification {
-    let mut parameters = [1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
+    let mut parameters =
+        Range::of_bone([1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed));
     parameters[1] = Range::Free { start: 15e9, lower: 12e9, upper: 25e9 };
     parameters[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
     JobSpecification {
@@ -27,6 +29,7 @@ fn specification(max_evaluations: u64) -> JobSpecification {
         setup: Setup::default(),
         data: Some(Data::from_moments(3900.0, 0.03)),
         parameters,
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo { realizations: 4, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations, ..SearchSettings::default() },
@@ -301,7 +304,7 @@ fn a_controlled_search_goes_by_the_moments_of_the_law() {
         };
         (0..monte_carlo.realizations).map(|index| Ok(0.99 * speed(index))).collect()
     };
-    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
+    let truth = Point::of_bone([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1]);
     let other = MonteCarlo { seed: 99, ..asked };
     let data = statistics::estimate(&other, &truth, &explained(&other, &truth)).unwrap().moments;
     let Moments { mean, coefficient_of_variation } = data;

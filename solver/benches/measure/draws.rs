@@ -8,7 +8,8 @@ use osteon_common::settings::{Method, SolverSettings};
 /// Seed of the draws.
 pub(crate) const SEED: u64 = 1;
 /// The paper's optimum, dispersion 0.1029.
-const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const OPTIMUM: Point =
+    Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
 /// The ensemble that bones are drawn from.
 pub(crate) fn ensemble() -> Ensemble {

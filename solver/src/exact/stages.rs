@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn the_stages_together_are_the_solver() {
-        let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+        let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
         let ensemble = Ensemble::new(&point, 1).unwrap();
         for refinement in [1.0, 2.0] {
             let mut setup = Setup::default();

@@ -131,7 +131,8 @@ mod tests {
     use crate::exact::pass::ExactWorkspace;
     use crate::isa::Isa;
 
-    const OPTIMUM: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+    const OPTIMUM: Point =
+        Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
 
     fn bits(exact: &Exact, bones: &[Bone]) -> Vec<u64> {
         let mut workspace = ExactWorkspace::default();

@@ -181,7 +181,7 @@ mod tests {
         // Receivers so far away that every echo is heard: both fluids are meshed whole.
         setup.probe.receivers.first_x1 = 0.1;
         setup.layers.marrow.thickness = 4e-3;
-        let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+        let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
         let bone = Ensemble::new(&point, 3).unwrap().bone(1).unwrap();
         let mesh =
             Mesh::with_sizes(&setup, &Scope::until_direct_wave(&setup, 5000.0), 8, [0.4e-3; 3]);

@@ -261,6 +261,9 @@ fn effect_of_failures(
 fn parameters(found: &Identification, point: &Point, specification: &JobSpecification) -> String {
     let identified = found.identified();
     let matched = identified.is_some_and(|known| known.matched);
+    let is_determined = identified.is_some_and(|known| {
+        known.free_directions.is_empty() && known.bulk_velocity.standard_error.is_some()
+    });
     let on_bounds = SearchBox::new(specification.parameters).on_bounds(point);
     let row = |parameter: Parameter| {
         let (scale, unit) = scale(parameter);
@@ -277,7 +280,12 @@ fn parameters(found: &Identification, point: &Point, specification: &JobSpecific
             }
             (Range::Free { lower, upper, .. }, None) if matched => {
                 let on_bound = on_bounds.iter().any(|(bound, _)| *bound == parameter);
-                let note = if on_bound { "on a bound" } else { "not determined" };
+                let note = match on_bound {
+                    true => "on a bound",
+                    // The data determine c1111, and the bounds contain two values that give it.
+                    false if is_determined => "not unique",
+                    false => "not determined",
+                };
                 (digits(number, FREE_DIGITS), Some([lower, upper]), note)
             }
             (Range::Free { lower, upper, .. }, None) => {
@@ -289,7 +297,7 @@ fn parameters(found: &Identification, point: &Point, specification: &JobSpecific
         [name, format!("{shown}{unit}"), bounds.unwrap_or_default(), note.to_owned()]
     };
     let mut rows = vec![["", "best point", "bounds", ""].map(str::to_owned)];
-    rows.extend(Parameter::ALL.into_iter().map(row));
+    rows.extend(specification.parameters_given().map(row));
     aligned(&rows)
 }
 
@@ -303,6 +311,8 @@ pub(super) fn scale(parameter: Parameter) -> (f64, &'static str) {
     match parameter.unit() {
         "Pa" => (1e-9, " GPa"),
         "" => (1.0, ""),
+        "m" => (1e3, " mm"),
+        "m/s" => (1.0, " m/s"),
         _ => (1.0, " kg/m³"),
     }
 }

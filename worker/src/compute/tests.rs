@@ -3,11 +3,12 @@ use std::time::Duration;
 
 use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::parameters::Point;
+use osteon_common::random_quantities::{RandomQuantities, Scatter};
 use osteon_proto::evaluation::EvaluationInput;
 
 use super::*;
 
-const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const POINT: Point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 const TASK: Task = Task { attachment: 1, batch: 1 };
 const DEADLINE: Duration = Duration::from_secs(60);
 
@@ -16,7 +17,13 @@ fn work(point: Point, first: u64, count: u32) -> Work {
 }
 
 fn drawn(point: Point, germs: GermSource, first: u64, count: u32) -> Work {
-    let evaluation = EvaluationInput { id: 1, setup: Setup::default(), point, germs };
+    let evaluation = EvaluationInput {
+        id: 1,
+        setup: Setup::default(),
+        point,
+        germs,
+        random: RandomQuantities::default(),
+    };
     Work { evaluation: Arc::new(evaluation), first, count }
 }
 
@@ -58,6 +65,31 @@ fn outcomes_are_those_of_the_solver_alone() {
             })
             .collect();
         assert_eq!(solved(2, drawn(POINT, germs, 3, 4)), expected, "{scheme:?}");
+    }
+}
+
+/// Each realization with a random setup has that of its index.
+#[test]
+fn outcomes_with_random_setups_do_not_depend_on_threads_or_batches() {
+    let thickness = Scatter { standard_deviation: Some(0.3e-3), ..Scatter::default() };
+    let random = RandomQuantities { bone_thickness: thickness, ..RandomQuantities::default() };
+    let germs = GermSource { seed: 5, scheme: GermScheme::Sobol { points: 5 } };
+    let work = |first, count| {
+        let Work { evaluation, .. } = drawn(POINT, germs, first, count);
+        let evaluation = EvaluationInput { random, ..*evaluation };
+        Work { evaluation: Arc::new(evaluation), first, count }
+    };
+    let whole = solved(1, work(0, 7));
+    let joined = [solved(3, work(0, 4)), solved(2, work(4, 3))].concat();
+    assert_eq!(joined, whole);
+    let ensemble = Ensemble::drawn(&POINT, germs).unwrap();
+    let thicknesses = ensemble.clone().with_random(random);
+    for (index, result) in (0..).zip(whole) {
+        let setup = thicknesses.own_setup(index, &Setup::default()).unwrap();
+        assert_ne!(setup, Setup::default());
+        let bone = ensemble.bone(index).unwrap();
+        let arrival = Solver::new(&setup).arrival(&bone, &mut Workspace::default()).unwrap();
+        assert_eq!(result.outcome, Ok(arrival.velocity), "{index}");
     }
 }
 

@@ -10,6 +10,7 @@ use osteon_common::case::Setup;
 use osteon_common::germ_source::GermSource;
 use osteon_common::outcome::RealizationResult;
 use osteon_common::parameters::Point;
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::evaluation::{self, EvaluationInput};
 use osteon_proto::v1::attach_response::Message as Reply;
@@ -114,7 +115,13 @@ async fn take_answers(
 
 fn work() -> Work {
     let (setup, germs) = (Setup::default(), GermSource::streams(5));
-    let evaluation = EvaluationInput { id: 1, setup, point: Point([1.0; 7]), germs };
+    let evaluation = EvaluationInput {
+        id: 1,
+        setup,
+        point: Point::of_bone([1.0; 7]),
+        germs,
+        random: RandomQuantities::default(),
+    };
     Work { evaluation: Arc::new(evaluation), first: 7, count: 2 }
 }
 

@@ -4,6 +4,7 @@ use osteon_common::case::Setup;
 use osteon_common::germ_source::GermSource;
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::parameters::Point;
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_proto::announced::EVALUATIONS_KEPT_MAX;
 use osteon_proto::evaluation::{self, EvaluationInput};
 
@@ -11,7 +12,7 @@ use super::*;
 
 /// The evaluation of all batches.
 const EVALUATION: u64 = 6;
-const POINT: Point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+const POINT: Point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 
 /// A worker under test, which checks that every effect is taken before the next event.
 struct Recorder {
@@ -91,7 +92,13 @@ impl Recorder {
 
 fn work() -> Work {
     let (setup, germs) = (Setup::default(), GermSource::streams(1));
-    let evaluation = EvaluationInput { id: EVALUATION, setup, point: POINT, germs };
+    let evaluation = EvaluationInput {
+        id: EVALUATION,
+        setup,
+        point: POINT,
+        germs,
+        random: RandomQuantities::default(),
+    };
     Work { evaluation: Arc::new(evaluation), first: 10, count: 2 }
 }
 

@@ -65,7 +65,7 @@ fn p_values_are_uniform_under_one_law_and_small_under_two() {
 /// as points.
 #[test]
 fn p_values_are_uniform_against_sobol_points() {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     let velocities = |monte_carlo: MonteCarlo| -> Vec<f64> {
         let ensemble = Ensemble::drawn(&point, monte_carlo.germs()).unwrap();
         let speed = |index| {

@@ -6,7 +6,7 @@ use crate::special::standard_normal_quantile;
 use crate::statistics::moments;
 
 pub(super) const OPTIMUM: Point =
-    Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
 const MEAN: f64 = 3906.0;
 const DEVIATION: f64 = 105.0;
 

@@ -6,6 +6,7 @@ use std::time::Duration;
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, MonteCarlo, Objective, Range, Search as SearchSettings};
 use osteon_common::outcome::Outcome;
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::EstimatedError;
 use osteon_common::version::Program;
 use osteon_search::{Ending, Search, Step};
@@ -24,13 +25,15 @@ const JOB: JobId = JobId(1);
 
 /// Returns an ended search of eight evaluations, and the record of its best.
 pub(crate) fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
-    let mut parameters = [1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed);
+    let mut parameters =
+        Range::of_bone([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed));
     parameters[6] = Range::Free { start: 0.12, lower: 0.02, upper: 0.3 };
     let specification = Arc::new(JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
         data: Some(Data::from_moments(3900.0, 0.03)),
         parameters,
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo { realizations: 2, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations: 8, ..SearchSettings::default() },

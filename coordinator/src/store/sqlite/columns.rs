@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::outcome::{Outcome, decode, encode};
-use osteon_common::parameters::Point;
+use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Point};
 use osteon_common::results::EstimatedError;
 use osteon_common::version::Program;
 use rusqlite::Row;
@@ -160,14 +160,19 @@ fn unpack_errors(packed: &[u8]) -> Option<EstimatedError> {
     rest.is_empty().then_some(EstimatedError { median, largest })
 }
 
+/// Packs the numbers of the bone, and all others too if any of them is searched.
 pub(super) fn pack_point(point: Point) -> Vec<u8> {
-    point.0.into_iter().flat_map(f64::to_le_bytes).collect()
+    let of_bone = point.given().all(|(parameter, _)| parameter.of_setup().is_none());
+    let count = if of_bone { BONE_PARAMETERS } else { PARAMETERS };
+    point.0.into_iter().take(count).flat_map(f64::to_le_bytes).collect()
 }
 
 fn unpack(point: &[u8]) -> Option<Point> {
     let (values, rest) = point.as_chunks::<8>();
     let values: Vec<f64> = values.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
-    rest.is_empty().then(|| values.try_into().ok().map(Point)).flatten()
+    let of_bone = || <[f64; BONE_PARAMETERS]>::try_from(values.as_slice()).map(Point::of_bone);
+    let all = || <[f64; PARAMETERS]>::try_from(values.as_slice()).map(Point);
+    rest.is_empty().then(|| of_bone().or_else(|_| all()).ok()).flatten()
 }
 
 /// Packs worker names, one line each: the process, a slash and the number that it drew in

@@ -16,7 +16,7 @@ pub(super) const SCHEMA: &str = "
     CREATE TABLE evaluation (
         job INTEGER NOT NULL REFERENCES job(id),
         number INTEGER NOT NULL,
-        point BLOB NOT NULL,             -- seven little-endian f64
+        point BLOB NOT NULL,             -- seven or ten little-endian f64
         outcomes BLOB NOT NULL,          -- per index: code byte, velocity as little-endian f64
         estimated_error BLOB,            -- of the successes: median, largest, as little-endian f64
         workers TEXT NOT NULL,           -- whose answers are in it: a line each, PROCESS/INSTANCE HOST

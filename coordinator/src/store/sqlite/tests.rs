@@ -8,6 +8,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::parameters::Point;
+use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, EvaluationRole, GroupEnding, Status};
 
 use super::acknowledged::MarkFile;
@@ -17,14 +18,16 @@ use super::*;
 mod damage;
 
 pub(super) fn job(id: u64) -> JobRecord {
-    let mut parameters =
-        [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029].map(Range::Fixed);
+    let mut parameters = Range::of_bone(
+        [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029].map(Range::Fixed),
+    );
     parameters[1] = Range::Free { start: 17.717e9, lower: 12e9, upper: 25e9 };
     let specification = JobSpecification {
         kind: JobKind::Identification,
         setup: Setup::default(),
         data: Some(Data::from_velocities(vec![3900.25, 3901.5])),
         parameters,
+        random: RandomQuantities::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),
@@ -46,7 +49,15 @@ pub(super) fn evaluation(job: u64, number: u64) -> EvaluationRecord {
     EvaluationRecord {
         job: JobId(job),
         number,
-        point: Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1 + number as f64]),
+        point: Point::of_bone([
+            1598.8,
+            17.717e9,
+            0.3816,
+            4.795e9,
+            9.8254e9,
+            0.4495,
+            0.1 + number as f64,
+        ]),
         outcomes: Arc::from([Ok(3900.1), Err(FailureKind::NoConvergence), Ok(f64::MIN_POSITIVE)]),
         // As if every realization of the second one had failed.
         estimated_error: (number != 1)

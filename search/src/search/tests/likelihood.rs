@@ -42,7 +42,7 @@ pub(super) fn run_on_speeds(specification: &JobSpecification) -> Search {
 /// is 2.7 standard deviations of it.
 #[test]
 fn a_likelihood_finds_what_made_the_data() {
-    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    let truth = Point::of_bone([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     let (mut found, mut by_moments) = ([0.0; 2], [0.0; 2]);
     for seed in 0..30 {
         let job = by_likelihood(&truth, 100 + seed, 200);
@@ -63,7 +63,7 @@ fn a_likelihood_finds_what_made_the_data() {
 
 #[test]
 fn a_likelihood_reports_its_error_and_a_test_of_the_data() {
-    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    let truth = Point::of_bone([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     let job = by_likelihood(&truth, 5, 100);
     let search = run_on_speeds(&job);
     let best = search.result(&ending(&search), &Program::current(None)).best.unwrap();
@@ -88,7 +88,7 @@ fn a_likelihood_reports_its_error_and_a_test_of_the_data() {
 /// Far from the data only the floor of the density indicates where they are.
 #[test]
 fn a_likelihood_comes_back_from_far_away() {
-    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.04]);
+    let truth = Point::of_bone([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.04]);
     let mut job = by_likelihood(&truth, 5, 100);
     job.parameters[1] = Range::Free { start: 40e9, lower: 10e9, upper: 45e9 };
     job.parameters[6] = Range::Free { start: 0.03, lower: 0.02, upper: 0.3 };
@@ -102,7 +102,7 @@ fn a_likelihood_comes_back_from_far_away() {
 /// as wide.
 #[test]
 fn outliers_move_a_likelihood_less_than_moments() {
-    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    let truth = Point::of_bone([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     let mut job = by_likelihood(&truth, 5, 200);
     let found = |job: &JobSpecification| {
         let search = run_on_speeds(job);
@@ -120,7 +120,7 @@ fn outliers_move_a_likelihood_less_than_moments() {
 
 #[test]
 fn velocities_that_are_all_the_same_have_no_likelihood() {
-    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    let truth = Point::of_bone([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     let mut search = Search::new(Arc::new(by_likelihood(&truth, 5, 10)));
     while let Step::Evaluate(_) = search.ask() {
         search.tell([Ok(3900.0); 4].into(), ERRORS);

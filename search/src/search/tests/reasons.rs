@@ -184,7 +184,7 @@ fn a_posterior_that_is_none_or_not_exact_has_not_converged() {
 /// The interpolation is right, but eight realizations are too few beside four thousand velocities.
 #[test]
 fn a_posterior_of_too_noisy_a_model_has_not_converged() {
-    let truth = Point([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
+    let truth = Point::of_bone([1598.8, 17.7e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
     let mut job = by_likelihood(&truth, 1, 4000);
     job.search.method = SearchMethod::Posterior;
     job.posterior = Some(PosteriorSettings::default());

@@ -11,7 +11,7 @@ use crate::vector::Scalar;
 
 /// A triclinic draw.
 fn bone() -> Bone {
-    let point = Point([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
     Ensemble::new(&point, 11).unwrap().bone(0).unwrap()
 }
 

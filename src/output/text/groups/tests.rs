@@ -128,7 +128,7 @@ fn what_the_data_cannot_say_is_told_once() {
         group["sensitivities"] = Value::Object(free);
         table(&[group.clone(), group])
     };
-    let seven = Parameter::ALL.map(Parameter::name);
+    let seven = Parameter::OF_BONE.map(Parameter::name);
     let text = with(&seven);
     assert_eq!(text.matches("Two moments cannot determine 7 parameters.").count(), 1, "{text}");
     assert!(text.contains("fix its mean velocity and its coefficient"), "{text}");

@@ -12,7 +12,6 @@ use std::time::Duration;
 use osteon_common::case::Case;
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
-use osteon_common::realization::Ensemble;
 use osteon_files::case_file;
 
 use super::{batches, schedule};
@@ -124,10 +123,12 @@ pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<RunFai
 /// Returns a realization as a complete case file, or an empty text if its germs give no elasticity:
 /// such a realization is never solved, and crashes no worker.
 fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> String {
-    let ensemble = Ensemble::drawn(point, specification.monte_carlo.germs()).ok();
-    let bone = ensemble.and_then(|ensemble| ensemble.bone(index).ok());
-    let case = bone.map(|bone| Case { setup: specification.setup, bone });
-    case.map_or_else(String::new, |case| case_file::to_toml(&case))
+    let case = || {
+        let ensemble = specification.ensemble(point).ok()?;
+        let bone = ensemble.bone(index).ok()?;
+        Some(Case { setup: ensemble.setup(index, &specification.setup), bone })
+    };
+    case().map_or_else(String::new, |case| case_file::to_toml(&case))
 }
 
 /// Returns whether a task that the workers in `of` are eligible for is poison: the crash limit is

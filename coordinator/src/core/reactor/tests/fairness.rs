@@ -71,7 +71,7 @@ fn what_waits_is_bounded_in_bytes() {
         )
     };
     let mut rig = Rig::new();
-    rig.state.config.jobs_bytes_max = 400_000;
+    rig.state.config.jobs_bytes_max = 420_000;
     let mut accepted = |client, velocities| {
         let effects = rig.event(of(client, velocities));
         if effects[0].starts_with("answer 0: the specifications of ") {

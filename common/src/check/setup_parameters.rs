@@ -1,0 +1,79 @@
+//! Rules on the parameters of the setup.
+
+use crate::accepted::written;
+use crate::job::{JobSpecification, Range};
+use crate::parameters::{AS_IN_SETUP, Parameter};
+use crate::setup_quantity::SetupQuantity;
+use crate::violations::{Violation, Violations};
+
+use super::random_quantities::{OF_SETUP, random_quantities};
+use super::range::range;
+use super::setup::setup as check_setup;
+use super::value::known_wrong;
+
+/// Checks the parameters that not every job has. Both bounds must give a valid setup, also with the
+/// quantities that are random, so that no point of a search is without one.
+pub(super) fn setup_parameters(specification: &JobSpecification, violations: &mut Violations) {
+    for parameter in Parameter::OF_SETUP {
+        let Some(quantity) = parameter.of_setup() else { continue };
+        let path = format!("parameters.{}", parameter.name());
+        match specification.range(parameter) {
+            Range::Fixed(value) if value.to_bits() == AS_IN_SETUP.to_bits() => {}
+            Range::Fixed(_) if known_wrong(&path, violations) => {}
+            Range::Fixed(_) => violations.add(
+                path,
+                format!("is fixed; leave it out, and set {} instead", quantity.mean_key()),
+            ),
+            Range::Free { .. } if quantity.of(&specification.setup).is_none() => violations.add(
+                path,
+                format!("is searched, and {} is not given; give both", quantity.mean_key()),
+            ),
+            searched @ Range::Free { lower, upper, .. } => {
+                range(parameter, searched, violations);
+                let wrong = |field: &str| violations.has_at_or_below(field);
+                if !OF_SETUP.iter().any(|field| wrong(field)) && !wrong(&path) {
+                    ends(quantity, [lower, upper], &path, specification, violations);
+                }
+            }
+        }
+    }
+}
+
+/// Checks the random quantities about the setup at the start, or about that of the job if the start is
+/// refused.
+pub(super) fn random_setup(specification: &JobSpecification, violations: &mut Violations) {
+    let JobSpecification { setup, random, .. } = specification;
+    let is_wrong = |parameter: Parameter| {
+        violations.has_at_or_below(&format!("parameters.{}", parameter.name()))
+    };
+    let about = match Parameter::OF_SETUP.into_iter().any(is_wrong) {
+        true => *setup,
+        false => specification.start().setup(setup),
+    };
+    random_quantities(random, &about, violations);
+}
+
+fn ends(
+    quantity: SetupQuantity,
+    bounds: [f64; 2],
+    path: &str,
+    specification: &JobSpecification,
+    violations: &mut Violations,
+) {
+    let setup = specification.start().setup(&specification.setup);
+    let refused = |bound| {
+        let at_bound = quantity.with(bound, setup);
+        let violation = Violations::first_of(|found| {
+            check_setup(&at_bound, found);
+            random_quantities(&specification.random, &at_bound, found);
+        })?;
+        Some((bound, violation))
+    };
+    if let Some((bound, Violation { field, message, .. })) = bounds.into_iter().find_map(refused) {
+        let bound = written(bound);
+        violations.add(
+            format!("{path}.bounds"),
+            format!("the bound {bound} is refused: {field}: {message}"),
+        );
+    }
+}

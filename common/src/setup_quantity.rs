@@ -1,0 +1,101 @@
+//! Quantities of the setup that may be random, and those that may be searched.
+
+use crate::case::Setup;
+use crate::ensemble::SETUP_GERMS;
+use crate::parameters::{Parameter, Point};
+
+/// A quantity of the setup that may be random, or searched ([`Parameter::of_setup`]).
+/// The order of the variants is that of the germs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SetupQuantity {
+    /// Thickness of the bone, m.
+    BoneThickness,
+    /// Quality factor of the bone.
+    BoneQualityFactor,
+    /// Speed of sound of the coupling layer, m/s.
+    CouplingSoundSpeed,
+    /// Tilt of the probe, rad.
+    ProbeTilt,
+}
+
+impl SetupQuantity {
+    /// All quantities, in the order of their germs and of a user's file.
+    pub const ALL: [Self; SETUP_GERMS] =
+        [Self::BoneThickness, Self::BoneQualityFactor, Self::CouplingSoundSpeed, Self::ProbeTilt];
+
+    /// Returns the name used in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BoneThickness => "bone_thickness",
+            Self::BoneQualityFactor => "bone_quality_factor",
+            Self::CouplingSoundSpeed => "coupling_sound_speed",
+            Self::ProbeTilt => "probe_tilt",
+        }
+    }
+
+    /// Returns the path of the setup's key that holds the mean.
+    pub fn mean_key(self) -> &'static str {
+        match self {
+            Self::BoneThickness => "layers.bone.thickness",
+            Self::BoneQualityFactor => "layers.bone.attenuation.quality_factor",
+            Self::CouplingSoundSpeed => "layers.coupling.sound_speed",
+            Self::ProbeTilt => "probe.tilt",
+        }
+    }
+
+    /// Returns the unit; empty for a pure number.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::BoneThickness => "m",
+            Self::BoneQualityFactor => "",
+            Self::CouplingSoundSpeed => "m/s",
+            Self::ProbeTilt => "rad",
+        }
+    }
+
+    /// Returns the value in a setup; `None` if the setup has none.
+    pub fn of(self, setup: &Setup) -> Option<f64> {
+        match self {
+            Self::BoneThickness => Some(setup.layers.bone_thickness),
+            Self::BoneQualityFactor => setup.layers.bone_attenuation.quality_factor,
+            Self::CouplingSoundSpeed => Some(setup.layers.coupling.sound_speed),
+            Self::ProbeTilt => Some(setup.probe.tilt),
+        }
+    }
+
+    /// Returns the setup with this value.
+    #[must_use]
+    pub fn with(self, value: f64, mut setup: Setup) -> Setup {
+        match self {
+            Self::BoneThickness => setup.layers.bone_thickness = value,
+            Self::BoneQualityFactor => setup.layers.bone_attenuation.quality_factor = Some(value),
+            Self::CouplingSoundSpeed => setup.layers.coupling.sound_speed = value,
+            Self::ProbeTilt => setup.probe.tilt = value,
+        }
+        setup
+    }
+}
+
+impl Parameter {
+    /// Returns the quantity of the setup that this is, for the parameters that not every job has.
+    pub fn of_setup(self) -> Option<SetupQuantity> {
+        match self {
+            Self::BoneThickness => Some(SetupQuantity::BoneThickness),
+            Self::BoneQualityFactor => Some(SetupQuantity::BoneQualityFactor),
+            Self::CouplingSoundSpeed => Some(SetupQuantity::CouplingSoundSpeed),
+            _ => None,
+        }
+    }
+}
+
+impl Point {
+    /// Returns the setup at this point, given that of the job.
+    #[must_use]
+    pub fn setup(&self, setup: &Setup) -> Setup {
+        let with = |setup: Setup, (parameter, value): (Parameter, f64)| match parameter.of_setup() {
+            Some(quantity) => quantity.with(value, setup),
+            None => setup,
+        };
+        self.given().fold(*setup, with)
+    }
+}

@@ -1,0 +1,45 @@
+//! Quantities of the setup that are searched.
+
+use osteon_common::job::{JobKind, Range};
+use osteon_common::parameters::Parameter;
+
+use super::{check, edited};
+
+/// The first range of `files/job.toml`.
+const FIRST: &str = "[parameters.density]\n";
+
+/// Keys of a range before the first one of the file.
+fn with(name: &str, keys: &str) -> (&'static str, String) {
+    (FIRST, format!("[parameters.{name}]\n{keys}\n\n{FIRST}"))
+}
+
+#[test]
+fn setup_parameters() {
+    let edits = [
+        with("bone_thickness", "fixed = 3e-3"),
+        with("bone_thickness", "start = 3e-3"),
+        with("bone_thickness", "bounds = [2e-3]"),
+        with("bone_thickness", "bounds = [4e-3, 5e-3]"),
+        with("bone_thickness", "start = 6e-3\nbounds = [2.8e-3, 5e-3]"),
+        with("bone_thickness", "bounds = [-1e-3, 5e-3]"),
+        with("bone_thickness", "start = 3\nbounds = [2, 5]"),
+        // Extreme realizations of thinner bones have no thickness.
+        with("bone_thickness", "bounds = [0.3e-3, 5e-3]"),
+        with("bone_quality_factor", "bounds = [1.0, 30.0]"),
+        with("coupling_sound_speed", "bounds = [1400.0, 1.6]"),
+        with("marrow_sound_speed", "bounds = [1400.0, 1600.0]"),
+    ];
+    let edits: Vec<(&str, &str)> = edits.iter().map(|(from, to)| (*from, to.as_str())).collect();
+    check("rejected_setup_parameters", JobKind::Identification, &edits);
+}
+
+#[test]
+fn a_quantity_of_the_setup_starts_at_its_value_there() {
+    let (from, to) = with("bone_thickness", "bounds = [2e-3, 5e-3]");
+    let text = edited(from, &to);
+    let job = super::parsed(&text);
+    let expected = Range::Free { start: 3e-3, lower: 2e-3, upper: 5e-3 };
+    assert_eq!(job.range(Parameter::BoneThickness), expected);
+    assert_eq!(job.range(Parameter::CouplingSoundSpeed), Range::AS_IN_SETUP);
+    assert_eq!(job.parameters_given().count(), 8);
+}

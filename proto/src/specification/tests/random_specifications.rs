@@ -1,0 +1,217 @@
+//! Random specifications, all of them valid.
+
+use osteon_common::case::Setup;
+use osteon_common::job::{
+    PosteriorPrior, PosteriorSettings, PriorDistribution, Sampling, SearchMethod,
+};
+use osteon_common::moments::Moments;
+use osteon_common::parameters::extended;
+use osteon_common::random_quantities::{RandomDistribution, Scatter};
+use osteon_common::settings::{Method, SolverSettings};
+use proptest::prelude::*;
+
+use super::*;
+
+fn parameters() -> impl Strategy<Value = [Range; PARAMETERS]> {
+    proptest::array::uniform7((any::<bool>(), 0.0..1.0)).prop_map(|choices| {
+        Range::of_bone(std::array::from_fn(|i| {
+            let (start, lower, upper) = RANGES[i];
+            let (fixed, shift) = choices[i];
+            let value = start + 0.01 * shift * (upper - lower);
+            // An identification needs at least one free parameter.
+            if fixed && i < 6 {
+                Range::Fixed(value)
+            } else {
+                Range::Free { start: value, lower, upper }
+            }
+        }))
+    })
+}
+
+fn data() -> impl Strategy<Value = Data> {
+    let noise = (any::<bool>(), 2_usize..9, 0.0..0.9);
+    let exact = prop_oneof![
+        // The fixed first value keeps the velocities from being all equal.
+        proptest::collection::vec(2000.0..6000.0, 1..20).prop_map(|mut velocities| {
+            velocities.insert(0, 1999.0);
+            Data::from_velocities(velocities)
+        }),
+        proptest::collection::vec("[a-zβ ]{1,9}", 1..5).prop_map(|names| {
+            let group = |(i, name): (usize, &String)| Group {
+                name: format!("{name}{i}"),
+                velocities: vec![1999.0, 2000.0 + i as f64],
+                subjects: None,
+            };
+            Data::from_groups(names.iter().enumerate().map(group).collect())
+        }),
+        (2000.0..6000.0, 0.002..0.4).prop_map(|(mean, coefficient_of_variation)| {
+            Data::from_moments(mean, coefficient_of_variation)
+        }),
+    ];
+    (exact, noise).prop_map(|(data, noise)| with_noise(data, noise))
+}
+
+/// Adds what may be known of the noise, by chance.
+fn with_noise(mut data: Data, (known, few, part): (bool, usize, f64)) -> Data {
+    if !known {
+        return data;
+    }
+    let numbers = |count: usize| Some(numbered((0..count).map(|k| (k * k) % few)));
+    let smallest = (0..data.sets()).map(|set| {
+        let Moments { mean, coefficient_of_variation } = data.moments(set);
+        mean * coefficient_of_variation
+    });
+    data.repeatability = part * smallest.fold(f64::INFINITY, f64::min);
+    match &mut data.measurements {
+        Measurements::Velocities { velocities, subjects } => *subjects = numbers(velocities.len()),
+        Measurements::Groups(groups) => {
+            for group in groups.iter_mut().step_by(2) {
+                group.subjects = numbers(group.velocities.len());
+            }
+        }
+        Measurements::Moments { count, .. } => *count = Some(few as u64),
+    }
+    data
+}
+
+/// Adds a number of velocities to moments without one, as a posterior needs it.
+fn counted(mut data: Data) -> Data {
+    if let Measurements::Moments { count, .. } = &mut data.measurements {
+        count.get_or_insert(9);
+    }
+    data
+}
+
+/// Accepted in every setup.
+fn random() -> impl Strategy<Value = RandomQuantities> {
+    let distribution = proptest::sample::select(RandomDistribution::ALL.to_vec());
+    let scatter = (proptest::option::of(0.001..0.1), distribution);
+    let scatters = [scatter.clone(), scatter];
+    scatters.prop_map(|[thickness, speed]| {
+        let scatter = |(share, distribution): (Option<f64>, RandomDistribution), mean: f64| {
+            let deviation =
+                |share: f64| Scatter { standard_deviation: Some(share * mean), distribution };
+            share.map_or_else(Scatter::default, deviation)
+        };
+        RandomQuantities {
+            bone_thickness: scatter(thickness, 4e-3),
+            coupling_sound_speed: scatter(speed, 1500.0),
+            ..RandomQuantities::default()
+        }
+    })
+}
+
+fn setup() -> impl Strategy<Value = Setup> {
+    let exact = (0.5..1.5, proptest::option::of(2.0..99.0)).prop_map(|(refinement, quality)| {
+        let mut setup = Setup::default();
+        setup.solver.refinement = refinement;
+        setup.layers.bone_attenuation.quality_factor = quality;
+        (setup.probe.tilt, setup.probe.bidirectional) = (-0.02 * refinement, quality.is_some());
+        setup
+    });
+    let hybrid = (1e-4..1e-3, 2_u32..=12, proptest::option::of(1e-9..1e-7)).prop_map(
+        |(element_size, element_order, time_step)| SolverSettings {
+            method: Method::Hybrid,
+            refinement: 1.0,
+            element_size,
+            element_order,
+            time_step,
+        },
+    );
+    let hybrid = hybrid.prop_map(|solver| Setup { solver, ..Setup::default() });
+    prop_oneof![exact, hybrid]
+}
+
+prop_compose! {
+    /// With the centers of priors at the starts of the paper's search box.
+    fn posterior()(
+        draws in 100_u64..=20_000,
+        max_evaluations in 20_u64..=2_000,
+        laws in proptest::array::uniform7(
+            (proptest::sample::select(PriorDistribution::ALL.to_vec()), 0.01..1.0)),
+    ) -> PosteriorSettings {
+        let prior = |i: usize| PosteriorPrior::new(laws[i].0, RANGES[i].0, laws[i].1 * RANGES[i].0);
+        PosteriorSettings { draws, max_evaluations, priors: extended(std::array::from_fn(prior), PosteriorPrior::Uniform) }
+    }
+}
+
+/// Searches quantities of the setup, within one part in a thousand of their values there.
+fn searched(
+    mut parameters: [Range; PARAMETERS],
+    setup: &Setup,
+    chosen: [bool; 3],
+) -> [Range; PARAMETERS] {
+    for (parameter, _) in Parameter::ALL.into_iter().skip(7).zip(chosen).filter(|one| one.1) {
+        if let Some(value) = parameter.of_setup().and_then(|quantity| quantity.of(setup)) {
+            let (lower, upper) = (0.999 * value, 1.001 * value);
+            parameters[parameter as usize] = Range::Free { start: 1.0005 * value, lower, upper };
+        }
+    }
+    parameters
+}
+
+prop_compose! {
+    pub(super) fn specification()(
+        data in proptest::option::of(data()),
+        (parameters, chosen) in (parameters(), any::<[bool; 3]>()),
+        points in 2_u64..=9765,
+        scrambles in proptest::option::of(1_u64..=1024),
+        control_variate: bool,
+        seed in 0..1_u64 << 63,
+        max_failed_fraction in 0.0..1.0,
+        method in proptest::sample::select(SearchMethod::ALL.to_vec()),
+        max_evaluations in 1_u64..1000,
+        initial_step in 0.01..0.5,
+        starts in 1_u64..100,
+        first_start in 0_u64..=1000,
+        sensitivities: bool,
+        weights in proptest::array::uniform10(proptest::option::of(1e-9..1.0)),
+        setup in setup(),
+        random in random(),
+        posterior in proptest::option::of(posterior()),
+    ) -> JobSpecification {
+        let parameters = searched(parameters, &setup, chosen);
+        let needs_noise = posterior.is_some() || method == SearchMethod::Posterior;
+        let data = data.map(|data| if needs_noise { counted(data) } else { data });
+        let posterior = posterior.filter(|_| data.is_some()).map(|mut posterior| {
+            for (prior, range) in posterior.priors.iter_mut().zip(&parameters) {
+                if matches!(range, Range::Fixed(_)) {
+                    *prior = PosteriorPrior::Uniform;
+                }
+            }
+            posterior
+        });
+        let mut priors = [None; PARAMETERS];
+        for ((prior, weight), range) in priors.iter_mut().zip(weights).zip(&parameters) {
+            let drawn = matches!(range, Range::Free { .. }) && method == SearchMethod::Simplex;
+            *prior = weight.filter(|_| drawn).map(|weight| Prior { value: range.start(), weight });
+        }
+        let specification = JobSpecification {
+            kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
+            setup,
+            data,
+            parameters,
+            random,
+            monte_carlo: MonteCarlo {
+                realizations: points * scrambles.unwrap_or(1),
+                seed,
+                sampling: scrambles.map_or(Sampling::MonteCarlo, |_| Sampling::Sobol),
+                scrambles: scrambles.unwrap_or(1),
+                control_variate,
+                max_failed_fraction,
+            },
+            objective: Objective::default(),
+            search: Search {
+                max_evaluations,
+                initial_step,
+                starts,
+                first_start,
+                sensitivities,
+                priors,
+                ..Search::by(method)
+            },
+            posterior,
+        };
+        specification.with_implied(Omitted::default())
+    }
+}
