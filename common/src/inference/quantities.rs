@@ -6,10 +6,16 @@ use crate::bulk_velocity::bulk_velocity;
 use crate::conclusions::{DerivedQuantity, Uncertainty};
 use crate::data_statistics::{FewIntervals, intervals_of_data};
 use crate::ensemble::DISPERSION_MAX;
-use crate::job::{Data, JobSpecification};
+use crate::job::{Data, JobSpecification, Range};
 use crate::moments::ConfidenceInterval;
 use crate::parameters::{Parameter, Point};
 use crate::results::BestPoint;
+
+/// How far the logarithm of a mean velocity may be off the closed form, ln √(c1111/ρ), between two
+/// values of e_L.
+const CLOSED_FORM_ERROR: f64 = 0.01;
+/// Relative error of the e_L at which the closed form has its minimum.
+const LEAST_STIFFNESS_ERROR: f64 = 0.1;
 
 /// Distances of the ends of the intervals of ln v and ln Δ, below and above.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,6 +88,9 @@ impl Quantities<'_> {
                 Parameter::LongitudinalPoissonRatio | Parameter::TransversePoissonRatio => {
                     self.poisson_ratio(parameter, free)
                 }
+                _ if self.may_have_second_value(parameter) => {
+                    DerivedQuantity { value, known: None }
+                }
                 Parameter::Density
                 | Parameter::LongitudinalYoungModulus
                 | Parameter::LongitudinalShearModulus
@@ -95,6 +104,38 @@ impl Quantities<'_> {
             (parameter, quantity)
         };
         free.iter().map(quantity).collect()
+    }
+
+    /// Returns whether the bounds may contain a second value of this parameter with the same velocity,
+    /// which the data cannot tell from the first. c1111 does not depend on the sign of ν_L, and has a
+    /// minimum in e_L ([`modulus_of_least_stiffness`]).
+    fn may_have_second_value(&self, parameter: Parameter) -> bool {
+        let Range::Free { lower, upper, .. } = self.specification.range(parameter) else {
+            return false;
+        };
+        let value = self.best.point.get(parameter);
+        match parameter {
+            Parameter::LongitudinalPoissonRatio => (lower..=upper).contains(&-value),
+            Parameter::LongitudinalYoungModulus => {
+                let least = modulus_of_least_stiffness(&self.best.point);
+                let (beyond, other) = match value > least {
+                    true => (lower < least * (1.0 + LEAST_STIFFNESS_ERROR), lower),
+                    false => (upper > least * (1.0 - LEAST_STIFFNESS_ERROR), upper),
+                };
+                beyond
+                    && self.logarithm_at(parameter, other)
+                        > self.logarithm_at(parameter, value) - CLOSED_FORM_ERROR
+            }
+            _ => false,
+        }
+    }
+
+    /// Returns ln √(c1111/ρ) at the best point, but with this value; infinite where it is not
+    /// admissible, since c1111 grows without bound towards such values.
+    fn logarithm_at(&self, parameter: Parameter, value: f64) -> f64 {
+        let mut point = self.best.point;
+        point.0[parameter as usize] = value;
+        bulk_velocity(&point).map_or(f64::INFINITY, |found| found.logarithm)
     }
 
     fn poisson_ratio(&self, parameter: Parameter, free: &[Parameter]) -> DerivedQuantity {
@@ -182,6 +223,14 @@ impl Quantities<'_> {
         }
         self.linear.response(gradient, &self.noise.covariance())
     }
+}
+
+/// Returns the e_L at which c1111 is least, with the other parameters as in `point`: with a = 1 - ν_T and
+/// b = 2 e_T ν_L², c1111 = e_L² a / (e_L a - b) falls with e_L below 2 b/a and grows above it.
+fn modulus_of_least_stiffness(point: &Point) -> f64 {
+    let ratio = point.get(Parameter::LongitudinalPoissonRatio);
+    let a = 1.0 - point.get(Parameter::TransversePoissonRatio);
+    4.0 * point.get(Parameter::TransverseYoungModulus) * ratio * ratio / a
 }
 
 /// Returns the ends of the values of a Poisson ratio with which the mean model is admissible, with

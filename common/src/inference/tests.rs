@@ -224,6 +224,26 @@ fn nothing_is_known_where_the_model_does_not_match() {
     assert_eq!(inference(&specification, 0, &best, &rows), None);
 }
 
+/// At the optimum c1111 falls with e_L below 10.4 GPa: that of 17.7 GPa is that of 7.36 GPa, too, and
+/// the closed form tells no more than that the double is below 7.6 GPa.
+#[test]
+fn a_modulus_with_a_double_within_the_bounds_is_not_known() {
+    let free = [Parameter::LongitudinalYoungModulus, Parameter::Dispersion];
+    let mut specification = specification(&free, None);
+    let known = |specification: &JobSpecification| {
+        let found = found(specification, [1e-3, 2e-2]);
+        assert!(found.bulk_velocity.known.is_some() && found.dispersion.known.is_some());
+        found.parameters[0].1.known.is_some()
+    };
+    assert!(known(&specification));
+    let range = &mut specification.parameters[Parameter::LongitudinalYoungModulus as usize];
+    *range = Range::Free { start: 17.717e9, lower: 7.6e9, upper: 25e9 };
+    assert!(known(&specification));
+    let range = &mut specification.parameters[Parameter::LongitudinalYoungModulus as usize];
+    *range = Range::Free { start: 17.717e9, lower: 7.3e9, upper: 25e9 };
+    assert!(!known(&specification));
+}
+
 /// Compares with tabulated quantiles.
 #[test]
 fn quantiles_are_students() {
