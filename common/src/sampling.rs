@@ -415,6 +415,12 @@ impl WaveSampling {
     }
 }
 
+/// Returns the highest frequency of the last passes of a grade, Hz.
+pub fn widest_band(setup: &Setup, grade: Grade) -> f64 {
+    let [.., last] = relative_bands(grade, setup.solver.refinement, thinness(setup));
+    last * setup.probe.center_frequency
+}
+
 /// Returns the highest frequencies of the passes, as multiples of the centre frequency.
 fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> [f64; BANDS] {
     let wide = (10.5 * thinness).min(24.0);
@@ -422,7 +428,7 @@ fn relative_bands(grade: Grade, refinement: f64, thinness: f64) -> [f64; BANDS] 
     let widest = if refinement > 1.0 { 4.0 * wide } else { (4.0 * wide).min(48.0) };
     match grade {
         // Too much is thinned out of a quick sampling for a still wider band to help.
-        Grade::Quick => [5.25 * thinness, wide, wide, wide].map(|f| f * refinement),
+        Grade::Quick => [5.25 * thinness, wide, 2.0 * wide, 2.0 * wide].map(|f| f * refinement),
         Grade::Plain => [5.25 * thinness, wide, 2.0 * wide, widest].map(|f| f * refinement),
         Grade::Thorough => [wide, 2.0 * wide, widest, widest].map(|f| f * refinement.sqrt()),
         // Without thinning, a band of twice the width costs four times as much.

@@ -56,7 +56,7 @@ const LAST_REFINEMENT: f64 = 4.0;
 const LATE: (f64, f64) = (1.2, 1.3);
 /// Times from a pick to the direct wave, in periods, between which the weight of the next pass
 /// falls.
-const NEAR_DIRECT_WAVE: (f64, f64) = (0.05, 0.1);
+const NEAR_DIRECT_WAVE: (f64, f64) = (0.02, 0.05);
 /// Ratios to the threshold between which the weight of the next pass falls.
 const WEAK: (f64, f64) = (1.05, 1.1);
 /// Ratios of a skipped extremum to the threshold between which the weight of the next pass rises.

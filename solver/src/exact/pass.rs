@@ -13,7 +13,7 @@ use crate::exact::plate::{AccuratePlate, FastPlate};
 use crate::exact::response::Spectra;
 use crate::exact::signal::{Signal, Slopes, TimeGrid};
 use crate::exact::table_cache::TableMemory;
-use crate::exact::tables::Tables;
+use crate::exact::tables::{Tables, Waves};
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::picking::{self, Pick, Window, pick};
@@ -38,9 +38,9 @@ const OTHER_TAPERS: [(f64, f64); LANES] = [
 /// Fitted to the errors of the usual geometry at dispersions of 0.1 to 0.6 and with a plate of 1 mm,
 /// whose largest 1 % become 10 to 30 % smaller by it.
 const TAPER_PARTS: [f64; LANES] = [-0.1, 0.39, -0.47, -0.3, -0.39, 0.33, 0.24, 0.74];
-/// Ratio of the stated error to the root mean square change of the velocity by the other tapers: 98 of
+/// Ratio of the stated error to the root mean square change of the velocity by the other tapers: 99 of
 /// 100 errors are smaller.
-const BAND_FACTOR: f64 = 3.25;
+const BAND_FACTOR: f64 = 4.9;
 /// Largest further factor of thin plates and heavy marrows.
 const SLOW_DECAY_MAX: f64 = 2.0;
 /// Density of the marrow, kg/m³, above which the further factor grows.
@@ -49,15 +49,15 @@ const HEAVY_MARROW: f64 = 2000.0;
 /// need a wider band converge more slowly.
 const WIDER_FACTOR: f64 = 1.35;
 /// Ratio of the least stated error to the change of the velocity by doubling the band.
-const CHANGE_FACTOR: f64 = 0.3;
+const CHANGE_FACTOR: f64 = 0.45;
 /// Number of times before the earliest possible arrival, spread over one period, at which the signal
 /// is looked at.
 const BEFORE: usize = LANES - 1;
 /// Ratio of the stated error to the root mean square change of the velocity by the noise before the
 /// earliest possible arrival, as receivers have it at the same time.
-const NOISE_FACTOR: f64 = 3.0;
+const NOISE_FACTOR: f64 = 4.6;
 /// The same for noise that shifts the times in the least favourable way.
-const WORST_NOISE_FACTOR: f64 = 0.5;
+const WORST_NOISE_FACTOR: f64 = 0.75;
 /// Rate at which noise grows from where it is looked at to the pick, relative to the damping, where a
 /// layer is attenuated: what the sums leave out is then larger compared with the arrival.
 const NOISE_GROWTH: f64 = 0.5;
@@ -157,7 +157,7 @@ impl BinTables {
         let whole = velocity_taper(sampling.whole_band());
         // A velocity does not depend on the pulse's amplitude, not even in its last bit.
         let keep = memory.is_some();
-        let tables = Tables::new(setup, sampling, 1.0, whole, memory);
+        let tables = Tables::new(setup, sampling, Waves::Early, 1.0, whole, memory);
         let grid = TimeGrid::new(setup, &tables, keep);
         let first = Band::new(&tables, sampling.first_band());
         let wider = sampling.bands.windows(2).filter(|pair| pair[0] < pair[1]);

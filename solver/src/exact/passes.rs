@@ -16,9 +16,13 @@ use crate::solver::Failure;
 
 /// Stated errors due to the band, or to the sampling, at refinement 1, between which the weight of the
 /// pass with the next wider band, or of the next sampling, rises from 0 to 1.
-const LARGE_ERROR: (f64, f64) = (1.4e-4, 1.9e-4);
-/// The same of the errors due to the sampling, for the last two samplings.
-const VERY_LARGE_ERROR: (f64, f64) = (1.5e-4, 2.2e-4);
+const LARGE_ERROR: (f64, f64) = (2.1e-4, 2.9e-4);
+/// The same of the errors due to the sampling, for the last two samplings, and of those due to the band
+/// where the next sampling has no wider one.
+const VERY_LARGE_ERROR: (f64, f64) = (2.3e-4, 3.4e-4);
+/// Stated errors between which the weight of the thorough passes rises, even where the error is due to
+/// the band: a short array needs times that are more accurate than usual.
+const USELESS_ERROR: (f64, f64) = (5e-4, 8e-4);
 /// Ratios of a pick to the largest wave in its window between which the weight of the next pass
 /// falls, for an array of [`USUAL_ARRAY`]: the errors of thinning and of leaving out slow
 /// waves reach some 1e-5 of that wave.
@@ -82,8 +86,7 @@ impl<'a> BonePasses<'a> {
         }
         let mut thorough = None;
         let quick = self.quick(&caches.quick);
-        let weight =
-            quick.as_ref().map_or(0.0, |found| exact.inexact(found).max(exact.small(found)));
+        let weight = quick.as_ref().map_or(0.0, |found| exact.replaced_by_plain(found));
         let plain = (weight > 0.0).then(|| self.plain(&caches.plain));
         let plain = plain.map(|found| self.checked(found, &mut thorough));
         // What the plain grade replaces as a whole need not be checked.
@@ -95,22 +98,23 @@ impl<'a> BonePasses<'a> {
     }
 
     /// Makes the thorough passes, once for both grades, if the pick of a quick or plain grade is
-    /// unreliable or missing, or if its sampling error is large.
+    /// unreliable or missing, or if its sampling error, or the whole error after all bands, is large.
     fn checked(
         &mut self,
         found: Result<Estimated, Failure>,
         thorough: &mut Option<Result<Estimated, Failure>>,
     ) -> Result<Estimated, Failure> {
         let Self { exact, caches, speed, .. } = *self;
-        let large = |found: &Estimated| rise(exact.counted(found.sampling_error), VERY_LARGE_ERROR);
-        let doubt = |found: &Estimated| large(found).max(exact.fallback_weight(found, speed));
+        let doubt = |found: &Estimated| {
+            exact.coarse(found).max(exact.useless(found)).max(exact.fallback_weight(found, speed))
+        };
         let weight = found.as_ref().map_or(1.0, doubt);
         if weight == 0.0 {
             return found;
         }
         let thorough = thorough.get_or_insert_with(|| {
             let thorough = self.thorough(&caches.thorough, VERY_LARGE_ERROR.1);
-            self.completed(thorough, large)
+            self.completed(thorough, |found| exact.coarse(found))
         });
         exact.merged(found, thorough.clone(), weight)
     }
@@ -234,6 +238,24 @@ impl Exact {
     /// Returns the weight of a wider band or another sampling.
     fn inexact(&self, found: &Estimated) -> f64 {
         rise(self.counted(found.error()), LARGE_ERROR)
+    }
+
+    /// Returns the weight of the plain grade's passes after those of the quick one. If the quick band was
+    /// as wide as theirs, only a finer sampling can be gained from them.
+    fn replaced_by_plain(&self, found: &Estimated) -> f64 {
+        let exhausted = found.sampled.band >= sampling::widest_band(&self.setup, Grade::Plain);
+        let limits = if exhausted { VERY_LARGE_ERROR } else { LARGE_ERROR };
+        rise(self.counted(found.error()), limits).max(self.small(found))
+    }
+
+    /// Returns the weight of the thorough and of the last passes.
+    fn coarse(&self, found: &Estimated) -> f64 {
+        rise(self.counted(found.sampling_error), VERY_LARGE_ERROR)
+    }
+
+    /// Returns the weight of the thorough passes where other bands have not helped.
+    fn useless(&self, found: &Estimated) -> f64 {
+        rise(self.counted(found.error()), USELESS_ERROR)
     }
 
     /// Returns the weight of a pass without thinning, which rises as the pick becomes small compared with

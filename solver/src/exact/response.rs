@@ -94,8 +94,9 @@ pub(crate) fn respond<const TERMS: usize>(
         let k = tables.wavenumbers(b);
         isa.run(Prepare { plate, medium, s: line.lossless.bone, k: (k.0[0], k.0[LANES - 1]) });
         let (block, echo) = tables.block(line, kept, b, &mut scratch);
-        let inertia = line.inertia;
-        responses.push(isa.run(Respond { plate, k, block, echo, inertia }));
+        let Line { inertia, .. } = *line;
+        let mirror = tables.mirror;
+        responses.push(isa.run(Respond { plate, k, block, echo, inertia, mirror }));
     }
 }
 
@@ -123,6 +124,8 @@ struct Respond<'a, const TERMS: usize> {
     block: &'a Block,
     echo: &'a ComplexLanes,
     inertia: Complex,
+    /// Share of the block's weights that are the mirror wave.
+    mirror: f64,
 }
 
 impl<const TERMS: usize> Kernel for Respond<'_, TERMS> {
@@ -130,20 +133,22 @@ impl<const TERMS: usize> Kernel for Respond<'_, TERMS> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> ComplexLanes {
-        let Self { plate, k, block, echo, inertia } = self;
+        let Self { plate, k, block, echo, inertia, mirror } = self;
         let inertia = ComplexVector { re: V::splat(inertia.re), im: V::splat(inertia.im) };
         let mut response = ComplexLanes::ZERO;
         for part in 0..V::PARTS {
             let load = ComplexVector::load(&block.load, part);
             let impedance = plate.impedance::<V>(V::load(k, part), load);
-            // R = (g d - q)/(g d + q), q = ρ1 s², d = -1/Y; R/(1 + R E2) with one division. Where
-            // the bone attenuates, both d and q are divided by m(s).
+            // R = (g d - q)/(g d + q), q = ρ1 s², d = -1/Y; half of (R + 1)/(1 + R E2) with one division,
+            // and less one half with the mirror wave. Where the bone attenuates, both d and q are
+            // divided by m(s).
             let gd = ComplexVector::load(&block.g, part).mul(impedance);
-            let numerator = gd.sub(inertia);
             let echo = ComplexVector::load(echo, part);
-            let denominator = numerator.mul_add(echo, gd.add(inertia));
+            let denominator = gd.sub(inertia).mul_add(echo, gd.add(inertia));
             let weight = ComplexVector::<V>::load(&block.weight, part);
-            weight.mul(numerator).mul(denominator.recip()).store(&mut response, part);
+            let mut whole = gd.mul(denominator.recip());
+            whole.re = whole.re.sub(V::splat(mirror));
+            weight.mul(whole).store(&mut response, part);
         }
         response
     }

@@ -29,10 +29,23 @@ pub(crate) struct Tables {
     /// cos(k x) of wavenumber block b at receiver r, at `[r * blocks + b]`.
     cosines: Vec<Lanes>,
     receivers: usize,
+    /// Share of a block's weights that are the mirror wave: a half, or 0 if it is left out.
+    pub(crate) mirror: f64,
     /// Maximum number of blocks of a line.
     blocks: usize,
     /// Memory in which lines are kept; without it they are recomputed whenever they are needed.
     memory: Option<Arc<TableMemory>>,
+}
+
+/// The waves that spectra consist of, other than the direct wave and its images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Waves {
+    /// All.
+    All,
+    /// Those that may arrive before the direct wave: without the mirror wave, which a face without
+    /// stiffness in place of the bone would reflect. It is the largest wave near the direct one, and
+    /// what band and sums cut off of it would disturb the first arrival.
+    Early,
 }
 
 /// Heights of source and receivers above the bone, m.
@@ -82,7 +95,7 @@ pub(crate) struct Block {
     pub(crate) g: ComplexLanes,
     /// Z = ρ2 s² tanh(g2 h2)/g2, Pa/m, divided by m(s) of the bone: the load on the lower face.
     pub(crate) load: ComplexLanes,
-    /// All factors of the reflection coefficient, including the measure of the sum over k.
+    /// All factors of (R + 1)/(1 + R E2), twice, including the measure of the sum over k.
     pub(crate) weight: ComplexLanes,
 }
 
@@ -94,13 +107,14 @@ impl Tables {
         (cosines * size_of::<f64>()) as f64
     }
 
-    /// Creates the tables for a pulse of the given amplitude.
+    /// Creates the tables for a pulse of the given amplitude, and some waves.
     ///
     /// `taper` cuts the whole band; lines are kept in `memory`, or recomputed whenever they are
     /// needed.
     pub(crate) fn new(
         setup: &Setup,
         sampling: WaveSampling,
+        waves: Waves,
         amplitude: f64,
         taper: (f64, f64),
         memory: Option<Arc<TableMemory>>,
@@ -139,6 +153,7 @@ impl Tables {
             wavenumbers,
             cosines,
             receivers: positions.len(),
+            mirror: if waves == Waves::All { 0.5 } else { 0.0 },
             blocks,
             memory,
         }
@@ -356,7 +371,7 @@ impl Line {
 struct SpectralPoint {
     g: Complex,
     load: Complex,
-    /// Factor of the reflection coefficient in p̂ per unit of F.
+    /// Twice the factor of (R + 1)/(1 + R E2) in p̂ per unit of F.
     factor: Complex,
     echo: Complex,
 }
@@ -369,8 +384,15 @@ struct SpectralPoint {
 /// e2 = exp(-g (x3 + x3S)), ea = exp(-2g (h1 - x3)), eb = exp(-2g (h1 - x3S)), E2 = exp(-2g h1)
 /// ```
 ///
-/// and ρ1/(2g) e2 R if no reflection of the outer face can arrive in a window. With a tilted probe x3 is
-/// the height of the lowest receiver, and 1 - ea is left to the sum over wavenumbers.
+/// The mirror wave is the same with R = -1. All of it travels through the coupling by paths longer than
+/// the direct one, and so arrives later. What remains without it is
+///
+/// ```text
+/// ρ1/(2g) e2 (1 - ea) (1 - eb) (R + 1) / ((1 + R E2) (1 - E2))
+/// ```
+///
+/// If no reflection of the outer face can arrive in a window, ea, eb and E2 are 0. With a tilted probe x3
+/// is the height of the lowest receiver, and 1 - ea is left to the sum over wavenumbers.
 fn spectral_point(
     setup: &Setup,
     heights: &Heights,
@@ -383,7 +405,7 @@ fn spectral_point(
     let one = Complex::new(1.0, 0.0);
     let g = vertical_wavenumber(k, line.lossless.coupling, coupling.sound_speed);
     let damp = |length: f64| (-g.scale(length)).exp();
-    let mut factor = damp(source + lowest).scale(0.5 * coupling.density) / g;
+    let mut factor = damp(source + lowest).scale(coupling.density) / g;
     let mut echo = Complex::default();
     if sampling.upper_echoes {
         if !heights.are_different() {
@@ -391,6 +413,7 @@ fn spectral_point(
         }
         factor = factor * (one - damp(2.0 * (coupling.thickness - source)));
         echo = damp(2.0 * coupling.thickness);
+        factor = factor / (one - echo);
     }
     let load = marrow_load(setup, line.s, &line.lossless, k, sampling.lower_echoes);
     SpectralPoint { g, load, factor, echo }

@@ -9,7 +9,7 @@ use thiserror::Error;
 use crate::exact::plate::AccuratePlate;
 use crate::exact::response::Spectra;
 use crate::exact::signal::Signal;
-use crate::exact::tables::Tables;
+use crate::exact::tables::{Tables, Waves};
 use crate::exact::{FillPlate, Solid, direct};
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
@@ -133,7 +133,7 @@ impl Solver {
         }
         let amplitude = self.setup().probe.amplitude;
         let cut = trace_taper(sampling.whole_band());
-        let tables = Tables::new(self.setup(), sampling, amplitude, cut, None);
+        let tables = Tables::new(self.setup(), sampling, Waves::All, amplitude, cut, None);
         let taper = tables.taper(cut);
         spectra.clear(&tables);
         spectra.fill(self.isa(), &tables, &medium, &mut plate, 0..tables.lines.len());
@@ -176,6 +176,77 @@ impl Solver {
             let run = &mut spectrum[i / LANES];
             run.re.0[i % LANES] += pressure.re;
             run.im.0[i % LANES] += pressure.im;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::case::Setup;
+    use osteon_common::parameters::Point;
+    use osteon_common::realization::Ensemble;
+    use osteon_common::sampling::{Grade, OuterFaces, direct_arrival, velocity_taper};
+
+    use super::*;
+    use crate::isa::Isa;
+
+    /// Returns the pressures at every receiver at these times before the direct wave arrives, s.
+    fn pressures_before(
+        setup: &Setup,
+        bone: &Bone,
+        waves: Waves,
+        faces: OuterFaces,
+        before: &[f64],
+    ) -> Vec<f64> {
+        let isa = Isa::fastest();
+        let medium = isa.run(Solid(bone));
+        let (mut plate, mut spectra) = (AccuratePlate::default(), Spectra::default());
+        let thickness = setup.layers.bone_thickness;
+        isa.run(FillPlate { medium: &medium, thickness, plate: &mut plate });
+        let speed = sampling::fastest(setup, medium.fastest);
+        let bin = sampling::speed_bin(setup, speed).unwrap();
+        let sampling = WaveSampling::for_speed_bin(setup, bin, Grade::Full, faces);
+        let cut = velocity_taper(sampling.whole_band());
+        let tables = Tables::new(setup, sampling, waves, 1.0, cut, None);
+        let taper = tables.taper(cut);
+        spectra.clear(&tables);
+        spectra.fill(isa, &tables, &medium, &mut plate, 0..tables.lines.len());
+        let of_receiver = |(r, place)| {
+            let mut spectrum = spectra.receiver(r).to_vec();
+            for (run, weights) in spectrum.iter_mut().zip(&taper) {
+                run.re = run.re * *weights;
+                run.im = run.im * *weights;
+            }
+            let signal =
+                Signal { sampling: &tables.sampling, runs: &tables.runs, spectrum: &spectrum };
+            let direct = direct_arrival(setup, place);
+            let times: Vec<f64> = before.iter().map(|before| direct - before).collect();
+            isa.run(SamplePressure { signal, times: &times })
+        };
+        setup.probe.places().enumerate().flat_map(of_receiver).collect()
+    }
+
+    /// Without and with the echoes of a thin coupling's outer face, from a level and a tilted probe, half
+    /// a period before the direct wave and earlier.
+    #[test]
+    fn the_mirror_wave_does_not_arrive_before_the_direct_one() {
+        let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+        let bone = Ensemble::new(&point, 1).unwrap().bone(0).unwrap();
+        let before: Vec<f64> = (1..=8).map(|i| f64::from(i) * 0.5e-6).collect();
+        for (thickness, tilt) in [(10e-3, 0.0), (3e-3, 0.0), (3e-3, 0.03)] {
+            let mut setup = Setup::default();
+            setup.layers.coupling.thickness = thickness;
+            setup.probe.tilt = tilt;
+            for faces in [OuterFaces::None, OuterFaces::Audible] {
+                let of = |waves| pressures_before(&setup, &bone, waves, faces, &before);
+                let (all, early) = (of(Waves::All), of(Waves::Early));
+                let largest = all.iter().fold(0.0, |largest: f64, p| largest.max(p.abs()));
+                assert!(largest > 0.0);
+                for (all, early) in all.iter().zip(&early) {
+                    let error = (all - early).abs() / largest;
+                    assert!(error < 1e-4, "{thickness} {tilt} {faces:?}: {error:e}");
+                }
+            }
         }
     }
 }
