@@ -33,7 +33,9 @@ pub use self::point::MeanModel;
 pub use self::posterior::{PosteriorReport, QuantityPosterior};
 pub use self::propagation::Propagation;
 pub use self::schema::schema;
-pub use self::simulation::{CheckedSolution, Receiver, Simulation};
+pub use self::simulation::{
+    CheckedSolution, GuidedWaveReport, GuidedWavesReport, Receiver, Simulation,
+};
 pub use self::solver::{EstimatedErrors, Solver};
 
 /// The result of a job.

@@ -16,6 +16,7 @@
 pub(crate) mod attenuation;
 pub(crate) mod direct;
 pub(crate) mod growth;
+pub(crate) mod guided;
 pub(crate) mod pass;
 mod passes;
 pub(crate) mod plate;

@@ -29,6 +29,7 @@ mod solver;
 mod vector;
 
 pub use complex::Complex;
+pub use exact::guided::{GuidedWave, GuidedWaves};
 #[cfg(feature = "measure")]
 pub use exact::quantities::{admittance, fastest_wave};
 #[cfg(feature = "measure")]

@@ -6,7 +6,7 @@ use osteon_common::case::Case;
 use osteon_common::warnings::case_warnings;
 use osteon_files::case_file;
 use osteon_solver::check::Check;
-use osteon_solver::{Arrival, Isa, Solver, TraceError, Traces, Workspace};
+use osteon_solver::{Arrival, GuidedWaves, Isa, Solver, TraceError, Traces, Workspace};
 
 use crate::arguments::SimulateArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
@@ -30,6 +30,7 @@ pub(super) async fn simulate(
     let shown = ShownSimulation {
         setup: &setup,
         arrival: &solved.arrival,
+        guided_waves: &solved.guided_waves,
         traces: traces.as_deref(),
         check: solved.check.as_ref(),
     };
@@ -40,6 +41,7 @@ pub(super) async fn simulate(
 
 struct SolvedCase {
     arrival: Result<Arrival, osteon_solver::Failure>,
+    guided_waves: GuidedWaves,
     check: Option<Check>,
 }
 
@@ -60,16 +62,22 @@ fn solve(
         None => None,
     };
     let arrival = solver.arrival(&case.bone, &mut Workspace::default());
+    let guided_waves = solver.guided_waves(&case.bone);
     if let Some((directory, traces)) = traces {
         // A check concerns only the solvers; the files kept are the same with and without it.
-        let shown =
-            ShownSimulation { setup: &case.setup, arrival: &arrival, traces: None, check: None };
+        let shown = ShownSimulation {
+            setup: &case.setup,
+            arrival: &arrival,
+            guided_waves: &guided_waves,
+            traces: None,
+            check: None,
+        };
         let positions = case.setup.probe.receivers.positions();
         let print = |file: &mut dyn Write| csv(&traces, positions, file);
         simulated.write(directory, &output::json::simulation(&shown), print)?;
     }
     let check = arguments.check.then(|| Check::run(case, isa));
-    Ok(SolvedCase { arrival, check })
+    Ok(SolvedCase { arrival, guided_waves, check })
 }
 
 fn trace_failure(error: TraceError) -> CommandFailure {

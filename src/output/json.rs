@@ -4,12 +4,15 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use osteon_common::version::Program;
-use osteon_files::report::{CheckedSolution, Receiver, Simulation};
+use osteon_files::report::{
+    CheckedSolution, GuidedWaveReport, GuidedWavesReport, Receiver, Simulation,
+};
 use osteon_proto::timestamp;
 use osteon_proto::v1::{
     BackupEnd, BannedWorker, DepartedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
 };
 use osteon_solver::check::{Difference, MethodSolution};
+use osteon_solver::{GuidedWave, GuidedWaves};
 use serde_json::{Value, json};
 
 use super::{Output, ShownResult, ShownSimulation, solver_of};
@@ -95,7 +98,7 @@ impl Output for JsonOutput<'_> {
 
 /// Returns the JSON object of a simulation as text, with a final newline.
 pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
-    let ShownSimulation { setup, arrival, check, .. } = *simulation;
+    let ShownSimulation { setup, arrival, guided_waves, check, .. } = *simulation;
     let Program { version, numerics, commit } = program::current();
     let (found, failed) = (arrival.as_ref().ok(), arrival.as_ref().err());
     let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
@@ -108,6 +111,7 @@ pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
         failure: failed.map(|failure| failure.kind),
         detail: failed.map(|failure| failure.detail.clone()),
         receivers: receivers.collect(),
+        guided_waves: guided_waves_report(guided_waves),
         picking: setup.picking,
         solver: solver_of(setup, found),
         check: check.map(|check| check.solutions().map(checked).collect()),
@@ -116,6 +120,19 @@ pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
         commit,
     };
     written.to_json()
+}
+
+fn guided_waves_report(waves: &GuidedWaves) -> GuidedWavesReport {
+    let wave = |wave: GuidedWave| GuidedWaveReport {
+        phase_velocity: wave.phase_velocity,
+        group_velocity: wave.group_velocity,
+    };
+    GuidedWavesReport {
+        frequency: waves.frequency,
+        a0: waves.a0.map(wave),
+        s0: waves.s0.map(wave),
+        reason: waves.reason().map(str::to_owned),
+    }
 }
 
 /// Converts one solution, with its outcome and its difference from the refined one.

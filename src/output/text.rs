@@ -10,6 +10,7 @@ mod number;
 pub(super) mod operators;
 mod posterior;
 mod result;
+mod simulation;
 mod solver;
 
 use std::io::{self, Write};
@@ -21,8 +22,8 @@ use osteon_proto::v1::{
 };
 
 use self::layout::{WIDTH, aligned, glued, wrapped};
-use self::number::{VELOCITY_DIGITS, digits, significant};
-use super::{Output, ShownResult, ShownSimulation, solver_of};
+use self::number::significant;
+use super::{Output, ShownResult, ShownSimulation};
 use crate::client;
 use crate::progress::{JobProgress, line, span};
 
@@ -46,7 +47,7 @@ impl Output for TextOutput<'_> {
     }
 
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
-        self.verbatim(&simulation_table(simulation))
+        self.verbatim(&simulation::table(simulation))
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {
@@ -150,44 +151,4 @@ fn progress(snapshot: &JobSnapshot, width: usize) -> String {
     let reason = snapshot.reason.lines().next().unwrap_or_default();
     let parts = [line(snapshot, &JobProgress::default(), width), reason.to_owned()];
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
-}
-
-fn simulation_table(simulation: &ShownSimulation<'_>) -> String {
-    let picking = simulation.setup.picking;
-    let mut text = match simulation.arrival {
-        Ok(arrival) => wrapped(&format!(
-            "velocity {} m/s ({} extremum, threshold {:?} of the packet's peak)",
-            digits(arrival.velocity, VELOCITY_DIGITS),
-            picking.extremum.name(),
-            picking.threshold
-        )),
-        Err(failure) => {
-            let kind = failure.kind.name().replace('_', " ");
-            let detail = Some(&failure.detail).filter(|detail| !detail.is_empty());
-            let detail = detail.map(|detail| format!(" ({detail})")).unwrap_or_default();
-            wrapped(&format!("no velocity: {kind}{detail}"))
-        }
-    };
-    if let Ok(arrival) = simulation.arrival {
-        if let Some(directions) = arrival.directions {
-            let [one, two] = directions.map(|velocity| digits(velocity, VELOCITY_DIGITS));
-            text.push_str(&wrapped(&format!(
-                "harmonic mean of {one} m/s from the first source and {two} m/s from the second"
-            )));
-        }
-        text.push_str("\nreceiver  x1 (mm)   time (µs)\n");
-        let positions = simulation.setup.probe.receivers.positions();
-        for (j, (x1, time)) in positions.zip(&arrival.times).enumerate() {
-            text.push_str(&format!("{:>8}  {:>7.3}  {:>10.5}\n", j + 1, x1 * 1e3, time * 1e6));
-        }
-    }
-    let solver = solver_of(simulation.setup, simulation.arrival.as_ref().ok());
-    text.push_str(&format!("\n{}", wrapped(&solver::single_velocity_line(&solver))));
-    if let Some(check) = simulation.check {
-        text.push_str(&format!("\n{}", check::table(check)));
-    }
-    if let Some(path) = simulation.traces {
-        text.push_str(&format!("\n{}", wrapped(&format!("traces in {}", visible::path(path)))));
-    }
-    text
 }

@@ -21,6 +21,8 @@ pub struct Simulation {
     pub detail: Option<String>,
     /// The receivers, in their order.
     pub receivers: Vec<Receiver>,
+    /// The fundamental guided waves of the bone.
+    pub guided_waves: GuidedWavesReport,
     /// The criterion of the first arrival.
     pub picking: Picking,
     /// How the velocity was computed.
@@ -51,6 +53,28 @@ pub struct Receiver {
     pub x1: f64,
     /// Picked time of the first arrival, s; null where there is none.
     pub time: Option<f64>,
+}
+
+/// The fundamental guided waves of the bone as a plate in a vacuum, without its attenuation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct GuidedWavesReport {
+    /// The centre frequency of the probe, at which they are computed, Hz.
+    pub frequency: f64,
+    /// The wave that is flexural at low frequencies; null where it was not found.
+    pub a0: Option<GuidedWaveReport>,
+    /// The wave that is extensional along the bone at low frequencies; null where it was not found.
+    pub s0: Option<GuidedWaveReport>,
+    /// Why a wave was not found; null where both were.
+    pub reason: Option<String>,
+}
+
+/// One guided wave.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct GuidedWaveReport {
+    /// Phase velocity, m/s.
+    pub phase_velocity: f64,
+    /// Group velocity, m/s.
+    pub group_velocity: f64,
 }
 
 /// One solution of a check, and how it differs from the refined one.

@@ -70,14 +70,14 @@ struct Prepared {
 /// A general matrix, by rows.
 type Matrix<V> = [ComplexVector<V>; 9];
 /// The entries 11, 12, 13, 22, 23, 33 of a symmetric matrix.
-type Symmetric<V> = [ComplexVector<V>; 6];
+pub(crate) type Symmetric<V> = [ComplexVector<V>; 6];
 
 /// Dynamic stiffness of a layer, scaled.
-struct Layer<V> {
+pub(crate) struct Layer<V> {
     /// A = K_tt; K_bb is its transpose.
-    top: Matrix<V>,
+    pub(crate) top: Matrix<V>,
     /// D = -K_tb: minus the traction on top for a displacement of the bottom.
-    down: Symmetric<V>,
+    pub(crate) down: Symmetric<V>,
     /// U = -K_bt: minus the traction on the bottom for a displacement of the top.
     up: Symmetric<V>,
 }
@@ -146,6 +146,15 @@ impl<const TERMS: usize> Plate<TERMS> {
         let load = load.scale(V::splat(1.0 / prepared.stiffness));
         layer.closed(load).scale(V::splat(prepared.stiffness))
     }
+
+    /// Returns the thinnest sublayer at wavenumbers `k` (rad/m), and the number of doublings, at least
+    /// one, that make the plate of it; `None` without [`Plate::prepare`] for these wavenumbers.
+    #[inline(always)]
+    pub(crate) fn thinnest<V: Vector>(&self, k: V) -> Option<(Layer<V>, u32)> {
+        let prepared = self.prepared?;
+        let layer = sublayer::<TERMS, V>(&self.polynomials, k.mul(V::splat(prepared.sublayer)));
+        Some((layer, prepared.doublings))
+    }
 }
 
 /// Returns the stiffness of the thinnest sublayer: with the blocks X and Y of the transfer matrix,
@@ -187,7 +196,7 @@ fn products<const TERMS: usize, V: Vector>(
 impl<V: Vector> Layer<V> {
     /// Returns two of these layers, one on the other.
     #[inline(always)]
-    fn doubled(&self) -> Self {
+    pub(crate) fn doubled(&self) -> Self {
         let factor = Factor::new(&self.joint());
         let down = factor.lower.forward(&self.down);
         let scaled = factor.scaled(&down);
@@ -210,7 +219,7 @@ impl<V: Vector> Layer<V> {
 
     /// Returns S = A + Aᵀ of the joint between two equal layers.
     #[inline(always)]
-    fn joint(&self) -> Symmetric<V> {
+    pub(crate) fn joint(&self) -> Symmetric<V> {
         let a = &self.top;
         [
             a[0].add(a[0]),

@@ -12,6 +12,12 @@ fn arrival() -> Arrival {
     }
 }
 
+const GUIDED_WAVES: GuidedWaves = GuidedWaves {
+    frequency: 1e6,
+    a0: Some(GuidedWave { phase_velocity: 1601.25, group_velocity: 1650.5 }),
+    s0: Some(GuidedWave { phase_velocity: 1610.75, group_velocity: 1598.125 }),
+};
+
 /// A setup with three receivers. The exact method's sampling changes with every improvement of it;
 /// the hybrid method's discretisation is set by the user.
 fn setup(method: Method) -> Setup {
@@ -27,8 +33,13 @@ fn simulation(
     check: Option<&Check>,
 ) -> String {
     let setup = setup(Method::Hybrid);
-    let shown =
-        ShownSimulation { setup: &setup, arrival, traces: Some(Path::new("d/traces.csv")), check };
+    let shown = ShownSimulation {
+        setup: &setup,
+        arrival,
+        guided_waves: &GUIDED_WAVES,
+        traces: Some(Path::new("d/traces.csv")),
+        check,
+    };
     // Each build has its own commit.
     let commit = format!("\"commit\": {}", serde_json::json!(crate::program::COMMIT));
     printed(format, |output| output.simulation(&shown).unwrap())
@@ -57,7 +68,13 @@ fn the_sampling_that_decided_is_shown() {
     let passes = Some(PassSummary { count: 3, pairs_computed: 17_000, last });
     let arrival = Ok(Arrival { passes, ..arrival() });
     let setup = setup(Method::Exact);
-    let shown = ShownSimulation { setup: &setup, arrival: &arrival, traces: None, check: None };
+    let shown = ShownSimulation {
+        setup: &setup,
+        arrival: &arrival,
+        guided_waves: &GUIDED_WAVES,
+        traces: None,
+        check: None,
+    };
     let text = |format| printed(format, |output| output.simulation(&shown).unwrap());
     let line = "solver exact: refinement 1, band to 12.5 MHz, period 11 µs; estimated";
     assert!(unwrapped(&text(OutputFormat::Text)).contains(line), "{}", text(OutputFormat::Text));
@@ -66,6 +83,35 @@ fn the_sampling_that_decided_is_shown() {
     for (key, number) in expected {
         assert_eq!(value["solver"][key], number, "{value:#}");
     }
+}
+
+#[test]
+fn guided_waves_that_were_not_found_are_explained_and_attenuation_is_named() {
+    let guided_waves = GuidedWaves { s0: None, ..GUIDED_WAVES };
+    let mut setup = setup(Method::Exact);
+    setup.layers.bone_attenuation.quality_factor = Some(10.0);
+    let arrival = Ok(arrival());
+    let shown = ShownSimulation {
+        setup: &setup,
+        arrival: &arrival,
+        guided_waves: &guided_waves,
+        traces: None,
+        check: None,
+    };
+    let text = unwrapped(&printed(OutputFormat::Text, |output| output.simulation(&shown).unwrap()));
+    for part in [
+        "without its attenuation, at 1 MHz",
+        "MHz A0 phase velocity 1601.250 m/s group velocity",
+        "not all were found: no wave",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(!text.contains("S0 phase"), "{text}");
+    let json = printed(OutputFormat::Json, |output| output.simulation(&shown).unwrap());
+    let waves = &serde_json::from_str::<serde_json::Value>(&json).unwrap()["guided_waves"];
+    assert_eq!(waves["s0"], serde_json::Value::Null);
+    assert_eq!(waves["a0"]["phase_velocity"], 1601.25);
+    assert!(waves["reason"].as_str().unwrap().starts_with("no wavenumber"), "{waves}");
 }
 
 /// A check in which the hybrid method differs by this.

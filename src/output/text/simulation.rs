@@ -1,0 +1,77 @@
+//! The outcome of one case.
+
+use osteon_common::visible;
+use osteon_solver::GuidedWave;
+
+use super::layout::{aligned, wrapped};
+use super::number::{DIGITS, VELOCITY_DIGITS, digits, significant};
+use super::{check, solver};
+use crate::output::{ShownSimulation, solver_of};
+
+/// Returns the outcome of one case, its times, its guided waves, and how they were computed.
+pub(super) fn table(simulation: &ShownSimulation<'_>) -> String {
+    let picking = simulation.setup.picking;
+    let mut text = match simulation.arrival {
+        Ok(arrival) => wrapped(&format!(
+            "velocity {} m/s ({} extremum, threshold {:?} of the packet's peak)",
+            digits(arrival.velocity, VELOCITY_DIGITS),
+            picking.extremum.name(),
+            picking.threshold
+        )),
+        Err(failure) => {
+            let kind = failure.kind.name().replace('_', " ");
+            let detail = Some(&failure.detail).filter(|detail| !detail.is_empty());
+            let detail = detail.map(|detail| format!(" ({detail})")).unwrap_or_default();
+            wrapped(&format!("no velocity: {kind}{detail}"))
+        }
+    };
+    if let Ok(arrival) = simulation.arrival {
+        if let Some(directions) = arrival.directions {
+            let [one, two] = directions.map(|velocity| digits(velocity, VELOCITY_DIGITS));
+            text.push_str(&wrapped(&format!(
+                "harmonic mean of {one} m/s from the first source and {two} m/s from the second"
+            )));
+        }
+        text.push_str("\nreceiver  x1 (mm)   time (µs)\n");
+        let positions = simulation.setup.probe.receivers.positions();
+        for (j, (x1, time)) in positions.zip(&arrival.times).enumerate() {
+            text.push_str(&format!("{:>8}  {:>7.3}  {:>10.5}\n", j + 1, x1 * 1e3, time * 1e6));
+        }
+    }
+    text.push_str(&format!("\n{}", guided_waves(simulation)));
+    let solver = solver_of(simulation.setup, simulation.arrival.as_ref().ok());
+    text.push_str(&format!("\n{}", wrapped(&solver::single_velocity_line(&solver))));
+    if let Some(check) = simulation.check {
+        text.push_str(&format!("\n{}", check::table(check)));
+    }
+    if let Some(path) = simulation.traces {
+        text.push_str(&format!("\n{}", wrapped(&format!("traces in {}", visible::path(path)))));
+    }
+    text
+}
+
+/// Returns the velocities of the guided waves.
+fn guided_waves(simulation: &ShownSimulation<'_>) -> String {
+    let waves = simulation.guided_waves;
+    let is_attenuated = simulation.setup.layers.bone_attenuation.quality_factor.is_some();
+    let without = if is_attenuated { ", without its attenuation" } else { "" };
+    let frequency = significant(waves.frequency * 1e-6, DIGITS);
+    let mut text =
+        wrapped(&format!("guided waves of the bone in a vacuum{without}, at {frequency} MHz"));
+    let row = |name: &str, wave: Option<GuidedWave>| {
+        let wave = wave?;
+        let [phase, group] = [wave.phase_velocity, wave.group_velocity]
+            .map(|velocity| digits(velocity, VELOCITY_DIGITS));
+        Some([
+            format!("  {name}"),
+            format!("phase velocity {phase} m/s"),
+            format!("group velocity {group} m/s"),
+        ])
+    };
+    let rows = [row("A0", waves.a0), row("S0", waves.s0)];
+    text.push_str(&aligned(&rows.into_iter().flatten().collect::<Vec<_>>()));
+    if let Some(reason) = waves.reason() {
+        text.push_str(&wrapped(&format!("not all were found: {reason}")));
+    }
+    text
+}
