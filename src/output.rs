@@ -13,7 +13,7 @@ use osteon_common::sampling::NominalSampling;
 use osteon_files::report::{ResultFile, Solver};
 use osteon_proto::v1::{BackupEnd, BannedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot};
 use osteon_solver::check::Check;
-use osteon_solver::{Arrival, Failure, GuidedWaves};
+use osteon_solver::{Arrival, Failure, FirstSignal, GuidedWaves};
 
 use crate::resolved::OutputFormat;
 
@@ -35,6 +35,8 @@ pub(crate) struct ShownSimulation<'a> {
     pub(crate) setup: &'a Setup,
     /// The picked arrival, or the failure.
     pub(crate) arrival: &'a Result<Arrival, Failure>,
+    /// Other observables of the first signal, if there is an arrival.
+    pub(crate) first_signal: Option<&'a FirstSignal>,
     /// The guided waves of the bone.
     pub(crate) guided_waves: &'a GuidedWaves,
     /// The file of the traces, if it was written.

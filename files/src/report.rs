@@ -34,7 +34,7 @@ pub use self::posterior::{PosteriorReport, QuantityPosterior};
 pub use self::propagation::Propagation;
 pub use self::schema::schema;
 pub use self::simulation::{
-    CheckedSolution, GuidedWaveReport, GuidedWavesReport, Receiver, Simulation,
+    CheckedSolution, FirstSignalReport, GuidedWaveReport, GuidedWavesReport, Receiver, Simulation,
 };
 pub use self::solver::{EstimatedErrors, Solver};
 

@@ -257,8 +257,11 @@ impl Exact {
         weight: f64,
     ) -> Result<Estimated, Failure> {
         let blend = |a: f64, b: f64| (b - a).mul_add(weight, a);
-        let pairs = first.pick.times.iter().zip(&second.pick.times);
-        let times: Vec<f64> = pairs.map(|(&a, &b)| blend(a, b)).collect();
+        let blend_all = |first: &[f64], second: &[f64]| -> Vec<f64> {
+            first.iter().zip(second).map(|(&a, &b)| blend(a, b)).collect()
+        };
+        let times = blend_all(&first.pick.times, &second.pick.times);
+        let amplitudes = blend_all(&first.pick.amplitudes, &second.pick.amplitudes);
         let fc = self.setup.probe.center_frequency;
         let (velocity, residual) = picking::line(&self.distances, &times, fc)?;
         let ratio = blend(first.pick.ratio, second.pick.ratio);
@@ -266,7 +269,7 @@ impl Exact {
         let prominence = blend(first.pick.prominence, second.pick.prominence);
         let band_error = blend(first.band_error, second.band_error);
         let sampling_error = blend(first.sampling_error, second.sampling_error);
-        let pick = Pick { velocity, times, ratio, skipped, residual, prominence };
+        let pick = Pick { velocity, times, amplitudes, ratio, skipped, residual, prominence };
         Ok(Estimated { pick, band_error, sampling_error, sampled: second.sampled })
     }
 }
@@ -288,10 +291,12 @@ fn rise(value: f64, (from, to): (f64, f64)) -> f64 {
 }
 
 /// Returns whether two setups have the same tables: they describe coupling, marrow, probe and
-/// sampling, and depend on the bone's thickness by the band that a thin plate needs alone.
+/// sampling, not what is picked, and depend on the bone's thickness by the band that a thin plate needs
+/// alone.
 pub(crate) fn has_tables_of(setup: &Setup, other: &Setup) -> bool {
     let mut alike = *setup;
     alike.layers.bone_thickness = other.layers.bone_thickness;
+    alike.picking = other.picking;
     alike == *other && sampling::thinness(setup).to_bits() == sampling::thinness(other).to_bits()
 }
 

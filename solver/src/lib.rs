@@ -18,6 +18,7 @@
 pub mod check;
 mod complex;
 mod exact;
+mod first_signal;
 pub mod hybrid;
 mod isa;
 mod lanes;
@@ -35,6 +36,7 @@ pub use exact::quantities::{admittance, fastest_wave};
 #[cfg(feature = "measure")]
 pub use exact::stages;
 pub use exact::traces::{TraceError, Traces};
+pub use first_signal::FirstSignal;
 pub use hybrid::{Hybrid, HybridWorkspace};
 pub use isa::{Isa, UnknownIsa};
 pub use solver::{Arrival, Failure, PassSummary, Sampled, Solver, Workspace};

@@ -68,6 +68,8 @@ pub(crate) struct Pick {
     pub(crate) velocity: f64,
     /// Time of the extremum at each receiver, s.
     pub(crate) times: Vec<f64>,
+    /// |p| of the extremum at each receiver, Pa, for a pulse of any one amplitude.
+    pub(crate) amplitudes: Vec<f64>,
     /// Ratio of the packet's first extremum to the packet's peak, in the median over the receivers.
     pub(crate) ratio: f64,
     /// Largest such ratio of an earlier extremum, which is below the threshold; 0 if there is none.
@@ -126,7 +128,8 @@ pub(crate) fn pick(
     let (velocity, residual) = line(distances, &times, center_frequency)?;
     let shares = windows.iter().zip(&picks).map(|(window, p)| p.pressure.abs() / window.largest());
     let prominence = shares.fold(f64::INFINITY, f64::min);
-    Ok(Pick { velocity, times, ratio, skipped, residual, prominence })
+    let amplitudes = picks.iter().map(|p| p.pressure.abs()).collect();
+    Ok(Pick { velocity, times, amplitudes, ratio, skipped, residual, prominence })
 }
 
 /// Returns the velocity, m/s, of the line through picked times (s), and the largest distance of a
@@ -327,6 +330,7 @@ mod tests {
         let picking = Picking { extremum: settings::Extremum::Second, threshold: 0.05 };
         let arrival = pick(&picking, FC, &distances, &windows).unwrap();
         assert!((arrival.times[0] - 5.8e-6).abs() < 1e-15);
+        assert_eq!(arrival.amplitudes, [1.0; 4]);
     }
 
     #[test]

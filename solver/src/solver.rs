@@ -43,6 +43,8 @@ pub struct Arrival {
     pub directions: Option<[f64; 2]>,
     /// Time of the picked extremum at each receiver, s, from the first source.
     pub times: Vec<f64>,
+    /// Modulus of its pressure there, Pa, for a pulse of any one amplitude: only ratios mean something.
+    pub amplitudes: Vec<f64>,
     /// Estimate of the velocity's relative error by discretisation, ≥ 0.
     pub estimated_error: f64,
     /// Sampling of the exact method; `None` for the hybrid method, whose discretisation is in the
@@ -133,7 +135,7 @@ impl Solver {
     }
 
     /// Returns a solver for another setup, which shares the tables if they are the same.
-    fn beside(&self, setup: &Setup) -> Self {
+    pub(crate) fn beside(&self, setup: &Setup) -> Self {
         if !has_tables_of(setup, &self.setup) {
             return Self::with_isa(setup, self.isa);
         }

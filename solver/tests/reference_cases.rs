@@ -126,3 +126,78 @@ fn traces_of_the_random_draw() {
         assert!(early_error <= 1e-3 * early, "receiver {r}: {early_error} of {early}");
     }
 }
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.collect();
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[test]
+fn the_second_extremum_and_the_frequency_are_those_of_the_references() {
+    for name in ["A", "D", "G"] {
+        let reference = reference(name);
+        let half = reference.times.iter().zip(&reference.times_second).map(|(one, two)| two - one);
+        let frequency = 0.5 / mean(half);
+        let (mut workspace, mut signals) = (Workspace::default(), Vec::new());
+        for extremum in [Extremum::First, Extremum::Second] {
+            let mut setup = reference.setup;
+            setup.picking.extremum = extremum;
+            let solver = Solver::new(&setup);
+            let arrival = solver.arrival(&reference.bone, &mut workspace).unwrap();
+            let signal = solver.first_signal(&reference.bone, &arrival, &mut workspace);
+            assert_ne!(signal.other_extremum, extremum);
+            signals.push((arrival.velocity, signal));
+        }
+        let [(first, of_first), (second, of_second)] = &signals[..] else { unreachable!() };
+        let error = second / reference.velocity_second - 1.0;
+        assert!(error.abs() <= 1e-4, "{name}: {second}: {error:e}");
+        // To the bit: one is the solution of the case with the other extremum.
+        assert_eq!(of_first.other_velocity, Ok(*second), "{name}");
+        assert_eq!(of_second.other_velocity, Ok(*first), "{name}");
+        assert_eq!(of_first.center_frequency, of_second.center_frequency, "{name}");
+        let error = of_first.center_frequency.unwrap() / frequency - 1.0;
+        // Times are accurate to 1e-9 s at most, of half periods of 0.4 µs.
+        assert!(error.abs() <= 5e-4, "{name}: {frequency} Hz: {error:e}");
+    }
+}
+
+/// Least-squares slope of 20 log10 |p| of the reference's traces at the reference's times.
+#[test]
+#[expect(clippy::disallowed_methods, reason = "an independent formula")]
+fn the_decay_is_that_of_the_reference_traces() {
+    let reference = reference("D");
+    let text = fs::read_to_string(path("D-traces.csv")).unwrap();
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|field| field.parse().unwrap()).collect())
+        .collect();
+    for extremum in [Extremum::First, Extremum::Second] {
+        let mut setup = reference.setup;
+        setup.picking.extremum = extremum;
+        let times = match extremum {
+            Extremum::First => &reference.times,
+            Extremum::Second => &reference.times_second,
+        };
+        let step = rows[1][0] - rows[0][0];
+        let levels = times.iter().enumerate().map(|(r, t)| {
+            // The parabola through the three nearest samples.
+            let at = (t / step).round() as usize;
+            let [a, b, c] = [-1, 0, 1].map(|side| rows[at.strict_add_signed(side)][r + 1]);
+            let peak = b - (c - a).powi(2) / (8.0 * (a - 2.0 * b + c));
+            20.0 * peak.abs().log10()
+        });
+        let levels: Vec<f64> = levels.collect();
+        let places: Vec<f64> = setup.probe.distances().map(|x| 100.0 * x).collect();
+        let (x, y) = (mean(places.iter().copied()), mean(levels.iter().copied()));
+        let cross: f64 = places.iter().zip(&levels).map(|(a, b)| (a - x) * (b - y)).sum();
+        let square: f64 = places.iter().map(|a| (a - x).powi(2)).sum();
+        let solver = Solver::new(&setup);
+        let mut workspace = Workspace::default();
+        let arrival = solver.arrival(&reference.bone, &mut workspace).unwrap();
+        let found = solver.first_signal(&reference.bone, &arrival, &mut workspace).decay;
+        let expected = -cross / square;
+        // Traces end their band elsewhere, and are sampled every 20 ns.
+        assert!((found - expected).abs() < 0.02, "{found} against {expected} dB/cm");
+    }
+}

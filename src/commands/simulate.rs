@@ -6,7 +6,9 @@ use osteon_common::case::Case;
 use osteon_common::warnings::case_warnings;
 use osteon_files::case_file;
 use osteon_solver::check::Check;
-use osteon_solver::{Arrival, GuidedWaves, Isa, Solver, TraceError, Traces, Workspace};
+use osteon_solver::{
+    Arrival, FirstSignal, GuidedWaves, Isa, Solver, TraceError, Traces, Workspace,
+};
 
 use crate::arguments::SimulateArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
@@ -30,6 +32,7 @@ pub(super) async fn simulate(
     let shown = ShownSimulation {
         setup: &setup,
         arrival: &solved.arrival,
+        first_signal: solved.first_signal.as_ref(),
         guided_waves: &solved.guided_waves,
         traces: traces.as_deref(),
         check: solved.check.as_ref(),
@@ -41,6 +44,7 @@ pub(super) async fn simulate(
 
 struct SolvedCase {
     arrival: Result<Arrival, osteon_solver::Failure>,
+    first_signal: Option<FirstSignal>,
     guided_waves: GuidedWaves,
     check: Option<Check>,
 }
@@ -61,13 +65,17 @@ fn solve(
         }
         None => None,
     };
-    let arrival = solver.arrival(&case.bone, &mut Workspace::default());
+    let mut workspace = Workspace::default();
+    let arrival = solver.arrival(&case.bone, &mut workspace);
+    let signal = |arrival| solver.first_signal(&case.bone, arrival, &mut workspace);
+    let first_signal = arrival.as_ref().ok().map(signal);
     let guided_waves = solver.guided_waves(&case.bone);
     if let Some((directory, traces)) = traces {
         // A check concerns only the solvers; the files kept are the same with and without it.
         let shown = ShownSimulation {
             setup: &case.setup,
             arrival: &arrival,
+            first_signal: first_signal.as_ref(),
             guided_waves: &guided_waves,
             traces: None,
             check: None,
@@ -77,7 +85,7 @@ fn solve(
         simulated.write(directory, &output::json::simulation(&shown), print)?;
     }
     let check = arguments.check.then(|| Check::run(case, isa));
-    Ok(SolvedCase { arrival, guided_waves, check })
+    Ok(SolvedCase { arrival, first_signal, guided_waves, check })
 }
 
 fn trace_failure(error: TraceError) -> CommandFailure {

@@ -5,14 +5,14 @@ use std::path::Path;
 
 use osteon_common::version::Program;
 use osteon_files::report::{
-    CheckedSolution, GuidedWaveReport, GuidedWavesReport, Receiver, Simulation,
+    CheckedSolution, FirstSignalReport, GuidedWaveReport, GuidedWavesReport, Receiver, Simulation,
 };
 use osteon_proto::timestamp;
 use osteon_proto::v1::{
     BackupEnd, BannedWorker, DepartedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
 };
 use osteon_solver::check::{Difference, MethodSolution};
-use osteon_solver::{GuidedWave, GuidedWaves};
+use osteon_solver::{FirstSignal, GuidedWave, GuidedWaves};
 use serde_json::{Value, json};
 
 use super::{Output, ShownResult, ShownSimulation, solver_of};
@@ -98,7 +98,7 @@ impl Output for JsonOutput<'_> {
 
 /// Returns the JSON object of a simulation as text, with a final newline.
 pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
-    let ShownSimulation { setup, arrival, guided_waves, check, .. } = *simulation;
+    let ShownSimulation { setup, arrival, first_signal, guided_waves, check, .. } = *simulation;
     let Program { version, numerics, commit } = program::current();
     let (found, failed) = (arrival.as_ref().ok(), arrival.as_ref().err());
     let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
@@ -111,6 +111,7 @@ pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
         failure: failed.map(|failure| failure.kind),
         detail: failed.map(|failure| failure.detail.clone()),
         receivers: receivers.collect(),
+        first_signal: first_signal.map(first_signal_report),
         guided_waves: guided_waves_report(guided_waves),
         picking: setup.picking,
         solver: solver_of(setup, found),
@@ -120,6 +121,19 @@ pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
         commit,
     };
     written.to_json()
+}
+
+fn first_signal_report(signal: &FirstSignal) -> FirstSignalReport {
+    let FirstSignal { other_extremum, other_velocity, decay, center_frequency } = signal;
+    let failed = other_velocity.as_ref().err();
+    FirstSignalReport {
+        other_extremum: *other_extremum,
+        other_velocity: other_velocity.as_ref().ok().copied(),
+        other_failure: failed.map(|failure| failure.kind),
+        other_detail: failed.map(|failure| failure.detail.clone()),
+        decay: *decay,
+        center_frequency: *center_frequency,
+    }
 }
 
 fn guided_waves_report(waves: &GuidedWaves) -> GuidedWavesReport {

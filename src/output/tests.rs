@@ -6,7 +6,7 @@ use osteon_files::document::Format as FileFormat;
 use osteon_files::job_file;
 use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
 use osteon_solver::check::{Difference, MethodSolution};
-use osteon_solver::{Failure, GuidedWave, PassSummary, Sampled};
+use osteon_solver::{Failure, FirstSignal, GuidedWave, PassSummary, Sampled};
 
 use super::*;
 use crate::sample_result::{identification, propagation};

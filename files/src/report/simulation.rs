@@ -1,7 +1,7 @@
 //! The result of `simulate`.
 
 use osteon_common::outcome::FailureKind;
-use osteon_common::settings::Picking;
+use osteon_common::settings::{Extremum, Picking};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +21,8 @@ pub struct Simulation {
     pub detail: Option<String>,
     /// The receivers, in their order.
     pub receivers: Vec<Receiver>,
+    /// What else the first signal tells; null where there is no velocity.
+    pub first_signal: Option<FirstSignalReport>,
     /// The fundamental guided waves of the bone.
     pub guided_waves: GuidedWavesReport,
     /// The criterion of the first arrival.
@@ -53,6 +55,25 @@ pub struct Receiver {
     pub x1: f64,
     /// Picked time of the first arrival, s; null where there is none.
     pub time: Option<f64>,
+}
+
+/// Observables of the first signal besides its velocity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FirstSignalReport {
+    /// The extremum that `picking` does not name.
+    pub other_extremum: Extremum,
+    /// Velocity of that extremum, m/s: that of the case if it were picked; null where there is none.
+    pub other_velocity: Option<f64>,
+    /// Why that extremum has no velocity; null where it has one.
+    pub other_failure: Option<FailureKind>,
+    /// The reason in words; null where it has one.
+    pub other_detail: Option<String>,
+    /// Decay of the picked extremum along the array, dB/cm: minus the least-squares slope of 20 log10 |p|
+    /// against the distance along the probe; negative where |p| grows.
+    pub decay: f64,
+    /// Frequency of the signal, Hz: 1/(2 T) with the mean T of the times from the first extremum to the
+    /// second at all receivers; null where one of both has no velocity.
+    pub center_frequency: Option<f64>,
 }
 
 /// The fundamental guided waves of the bone as a plate in a vacuum, without its attenuation.

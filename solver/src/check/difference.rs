@@ -90,6 +90,7 @@ mod tests {
             velocity,
             directions: None,
             times: times.to_vec(),
+            amplitudes: vec![1.0; 3],
             estimated_error: 0.0,
             passes: None,
         })

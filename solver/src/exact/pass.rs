@@ -134,6 +134,7 @@ impl Estimated {
             velocity: pick.velocity,
             directions: None,
             times: pick.times,
+            amplitudes: pick.amplitudes,
             estimated_error,
             passes: Some(PassSummary { count, pairs_computed, last }),
         }

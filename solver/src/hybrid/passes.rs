@@ -116,6 +116,7 @@ impl Passes<'_> {
             directions: None,
             velocity: pick.velocity,
             times: pick.times,
+            amplitudes: pick.amplitudes,
             // Passes that do not resolve the waves can agree by accident.
             estimated_error: estimate.max(dispersion.min(1.0)),
             passes: None,
@@ -322,6 +323,7 @@ mod tests {
         let pick = |velocity, times: [f64; 3]| Pick {
             velocity,
             times: times.to_vec(),
+            amplitudes: vec![1.0; 3],
             skipped: 0.0,
             ratio: 1.0,
             residual: 0.0,

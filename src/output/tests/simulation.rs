@@ -1,5 +1,7 @@
 //! Output of `simulate`.
 
+use osteon_common::settings::Extremum;
+
 use super::*;
 
 fn arrival() -> Arrival {
@@ -7,8 +9,18 @@ fn arrival() -> Arrival {
         velocity: 3908.75,
         directions: None,
         times: vec![2.9e-6, 3.104_7e-6, 3.309_3e-6],
+        amplitudes: vec![2.0, 1.5, 1.125],
         estimated_error: 2e-5,
         passes: None,
+    }
+}
+
+fn first_signal() -> FirstSignal {
+    FirstSignal {
+        other_extremum: Extremum::Second,
+        other_velocity: Ok(3878.0625),
+        decay: 3.125,
+        center_frequency: Some(1.125e6),
     }
 }
 
@@ -32,10 +44,11 @@ fn simulation(
     arrival: &Result<Arrival, Failure>,
     check: Option<&Check>,
 ) -> String {
-    let setup = setup(Method::Hybrid);
+    let (setup, signal) = (setup(Method::Hybrid), first_signal());
     let shown = ShownSimulation {
         setup: &setup,
         arrival,
+        first_signal: arrival.is_ok().then_some(&signal),
         guided_waves: &GUIDED_WAVES,
         traces: Some(Path::new("d/traces.csv")),
         check,
@@ -71,6 +84,7 @@ fn the_sampling_that_decided_is_shown() {
     let shown = ShownSimulation {
         setup: &setup,
         arrival: &arrival,
+        first_signal: None,
         guided_waves: &GUIDED_WAVES,
         traces: None,
         check: None,
@@ -94,6 +108,7 @@ fn guided_waves_that_were_not_found_are_explained_and_attenuation_is_named() {
     let shown = ShownSimulation {
         setup: &setup,
         arrival: &arrival,
+        first_signal: None,
         guided_waves: &guided_waves,
         traces: None,
         check: None,
@@ -112,6 +127,36 @@ fn guided_waves_that_were_not_found_are_explained_and_attenuation_is_named() {
     assert_eq!(waves["s0"], serde_json::Value::Null);
     assert_eq!(waves["a0"]["phase_velocity"], 1601.25);
     assert!(waves["reason"].as_str().unwrap().starts_with("no wavenumber"), "{waves}");
+}
+
+#[test]
+fn an_extremum_without_velocity_is_explained() {
+    let failure =
+        Failure { kind: FailureKind::NoArrival, detail: "receiver 3 has 1 extrema".to_owned() };
+    let signal = FirstSignal {
+        other_velocity: Err(failure),
+        decay: -0.5,
+        center_frequency: None,
+        ..first_signal()
+    };
+    let (setup, arrival) = (setup(Method::Exact), Ok(arrival()));
+    let shown = ShownSimulation {
+        setup: &setup,
+        arrival: &arrival,
+        first_signal: Some(&signal),
+        guided_waves: &GUIDED_WAVES,
+        traces: None,
+        check: None,
+    };
+    let text = unwrapped(&printed(OutputFormat::Text, |output| output.simulation(&shown).unwrap()));
+    let expected = "no velocity of the second extremum: no arrival (receiver 3 has 1 extrema) \
+                    decay along the array -0.5000 dB/cm guided waves";
+    assert!(text.contains(expected), "{text}");
+    let json = printed(OutputFormat::Json, |output| output.simulation(&shown).unwrap());
+    let signal = &serde_json::from_str::<serde_json::Value>(&json).unwrap()["first_signal"];
+    assert_eq!(signal["other_failure"], "no_arrival");
+    assert_eq!(signal["other_velocity"], serde_json::Value::Null);
+    assert_eq!(signal["center_frequency"], serde_json::Value::Null);
 }
 
 /// A check in which the hybrid method differs by this.

@@ -1,12 +1,15 @@
 //! The outcome of one case.
 
 use osteon_common::visible;
-use osteon_solver::GuidedWave;
+use osteon_solver::{FirstSignal, GuidedWave};
 
 use super::layout::{aligned, wrapped};
 use super::number::{DIGITS, VELOCITY_DIGITS, digits, significant};
 use super::{check, solver};
 use crate::output::{ShownSimulation, solver_of};
+
+/// Significant digits of decay and frequency of a signal.
+const SIGNAL_DIGITS: usize = 4;
 
 /// Returns the outcome of one case, its times, its guided waves, and how they were computed.
 pub(super) fn table(simulation: &ShownSimulation<'_>) -> String {
@@ -38,6 +41,9 @@ pub(super) fn table(simulation: &ShownSimulation<'_>) -> String {
             text.push_str(&format!("{:>8}  {:>7.3}  {:>10.5}\n", j + 1, x1 * 1e3, time * 1e6));
         }
     }
+    if let Some(signal) = simulation.first_signal {
+        text.push_str(&format!("\n{}", first_signal(signal)));
+    }
     text.push_str(&format!("\n{}", guided_waves(simulation)));
     let solver = solver_of(simulation.setup, simulation.arrival.as_ref().ok());
     text.push_str(&format!("\n{}", wrapped(&solver::single_velocity_line(&solver))));
@@ -48,6 +54,27 @@ pub(super) fn table(simulation: &ShownSimulation<'_>) -> String {
         text.push_str(&format!("\n{}", wrapped(&format!("traces in {}", visible::path(path)))));
     }
     text
+}
+
+/// Returns the observables of the first signal besides its velocity, a line for each.
+fn first_signal(signal: &FirstSignal) -> String {
+    let FirstSignal { other_extremum, other_velocity, decay, center_frequency } = signal;
+    let name = other_extremum.name();
+    let other = match other_velocity {
+        Ok(velocity) => {
+            format!("velocity of the {name} extremum {} m/s", digits(*velocity, VELOCITY_DIGITS))
+        }
+        Err(failure) => {
+            let kind = failure.kind.name().replace('_', " ");
+            format!("no velocity of the {name} extremum: {kind} ({})", failure.detail)
+        }
+    };
+    let decay = format!("decay along the array {} dB/cm", digits(*decay, SIGNAL_DIGITS));
+    let frequency = center_frequency.map(|frequency| {
+        let frequency = digits(frequency * 1e-6, SIGNAL_DIGITS);
+        format!("frequency {frequency} MHz, from the half period between both extrema")
+    });
+    [Some(other), Some(decay), frequency].into_iter().flatten().map(|line| wrapped(&line)).collect()
 }
 
 /// Returns the velocities of the guided waves.

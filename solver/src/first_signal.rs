@@ -1,0 +1,81 @@
+//! What the first signal tells besides its velocity.
+
+use std::f64::consts::LN_10;
+
+use osteon_common::case::{Bone, Setup};
+use osteon_common::settings::{Extremum, Picking};
+
+use crate::picking::{mean, slope};
+use crate::solver::{Arrival, Failure, Solver, Workspace};
+
+/// Decibels per neper: 20/ln 10.
+const DECIBELS: f64 = 20.0 / LN_10;
+/// Centimetres in a metre.
+const CENTIMETRES: f64 = 100.0;
+
+/// Observables of a picked first signal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FirstSignal {
+    /// The extremum that the case does not pick.
+    pub other_extremum: Extremum,
+    /// Its velocity, m/s: that of the case with the other extremum; or why it has none.
+    pub other_velocity: Result<f64, Failure>,
+    /// Decay of the picked extremum along the array, dB/cm: minus the least-squares slope of 20 log10 |p|
+    /// against the distance along the probe, from the first source. Negative where |p| grows.
+    pub decay: f64,
+    /// Frequency of the signal, Hz: 1/(2 T), with T the mean over the receivers of the time from the first
+    /// extremum to the second, from the first source; `None` if one of them was not picked.
+    pub center_frequency: Option<f64>,
+}
+
+impl Solver {
+    /// Computes the other observables of the first signal of a bone, of which `arrival` is the arrival.
+    /// The case is solved once more, with the other extremum.
+    pub fn first_signal(
+        &self,
+        bone: &Bone,
+        arrival: &Arrival,
+        workspace: &mut Workspace,
+    ) -> FirstSignal {
+        let setup = self.setup();
+        let other_extremum = match setup.picking.extremum {
+            Extremum::First => Extremum::Second,
+            Extremum::Second => Extremum::First,
+        };
+        let picking = Picking { extremum: other_extremum, ..setup.picking };
+        let other = self.beside(&Setup { picking, ..*setup }).arrival(bone, workspace);
+        let distances: Vec<f64> = setup.probe.distances().collect();
+        FirstSignal {
+            other_extremum,
+            decay: decay(&distances, &arrival.amplitudes),
+            center_frequency: other.as_ref().ok().and_then(|other| frequency(arrival, other)),
+            other_velocity: other.map(|other| other.velocity),
+        }
+    }
+}
+
+/// Returns the decay, dB/cm, of amplitudes at distances (m) from the source.
+fn decay(distances: &[f64], amplitudes: &[f64]) -> f64 {
+    let levels: Vec<f64> = amplitudes.iter().map(|p| DECIBELS * libm::log(*p)).collect();
+    -slope(&levels, distances) / CENTIMETRES
+}
+
+/// Returns the frequency, Hz, whose half period is the mean time between the extrema of two arrivals;
+/// `None` if they are the same extremum.
+fn frequency(one: &Arrival, other: &Arrival) -> Option<f64> {
+    let half_period = (mean(&one.times) - mean(&other.times)).abs();
+    (half_period > 0.0).then(|| 0.5 / half_period)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_decay_is_the_slope_of_the_level() {
+        // 20 dB in 2 cm, and a level that lies off the line without changing its slope.
+        let distances = [0.01, 0.02, 0.03];
+        assert!((decay(&distances, &[1.0, 0.4, 0.1]) - 10.0).abs() < 1e-12);
+        assert!((decay(&distances, &[1.0, 2.0, 10.0]) + 10.0).abs() < 1e-12);
+    }
+}
