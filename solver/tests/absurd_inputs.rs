@@ -230,10 +230,20 @@ properties! {
                 prop_assert_eq!(arrival.times.len(), setup.probe.receivers.count as usize);
                 prop_assert!(arrival.estimated_error.is_finite());
                 prop_assert!(arrival.estimated_error >= 0.0);
+                let signal = solver.first_signal(&bone, arrival, &mut workspace);
+                prop_assert!(signal.decay.is_finite());
+                prop_assert!(signal.center_frequency.is_none_or(|f| f.is_finite() && f > 0.0));
             }
             Err(failure) => prop_assert!(!failure.detail.is_empty()),
         }
         check_traces(&solver, &bone);
+        let waves = solver.guided_waves(&bone);
+        for wave in [waves.a0, waves.s0] {
+            let wave = wave.unwrap();
+            let phase = wave.phase_velocity;
+            prop_assert!(phase > 0.0 && phase < 1.001 * speed_bound(&setup, &bone), "{waves:?}");
+            prop_assert!(wave.group_velocity.is_finite(), "{waves:?}");
+        }
         // Another bone in between leaves no mark.
         if let Some(other) = matched(&setup) {
             let _other = solver.arrival(&other, &mut workspace);

@@ -173,6 +173,19 @@ fn thin_plates_have_the_velocities_of_membranes_and_of_bending() {
     }
 }
 
+#[test]
+fn plates_thinner_than_rounding_have_no_waves() {
+    for (thickness, found) in [(1e-6, true), (1e-12, false)] {
+        let waves = waves(&draw(0.1, 3), thickness, 1e6);
+        assert_eq!(waves.a0.is_some(), found, "{thickness}: {waves:?}");
+        assert_eq!(waves.reason().is_none(), found, "{thickness}: {waves:?}");
+    }
+    // The largest error of bending: its velocity and the one of its group, which is twice as large.
+    let waves = waves(&optimum(), 1e-7, 0.25e6);
+    let a0 = waves.a0.unwrap();
+    assert!((a0.group_velocity / a0.phase_velocity - 2.0).abs() < 2e-3, "{a0:?}");
+}
+
 /// Frequencies (rad/s) of all waves at one wavenumber in ascending order, with their group velocities,
 /// by Legendre polynomials across the plate.
 fn by_polynomials(c: &Elasticity, density: f64, h: f64, k: f64, degree: usize) -> Vec<[f64; 2]> {

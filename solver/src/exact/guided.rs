@@ -38,6 +38,10 @@ const BELOW_LEAST: f64 = 1.0 - 1e-9;
 const HALVINGS: usize = 50;
 /// The group velocity is the difference quotient over this part of the wavenumber in both directions.
 const GROUP_STEP: f64 = 1e-4;
+/// Least products of thickness and wavenumber: below them, rounding of the stiffness hides that of bending,
+/// which is their fourth power, or of extension, their square.
+const THINNEST_FLEXURAL: f64 = 1e-2;
+const THINNEST_EXTENSIONAL: f64 = 1e-5;
 /// Where a count is undecided (a pivot is exactly zero), it is made this much farther.
 const BESIDE: f64 = 1.0 + 1e-13;
 
@@ -65,7 +69,8 @@ impl GuidedWaves {
     /// Returns why there is no A0 or no S0; `None` if there are both.
     pub fn reason(&self) -> Option<&'static str> {
         (self.a0.is_none() || self.s0.is_none()).then_some(
-            "no wavenumber was found within 10⁸ times the least possible one, or a number was not finite",
+            "the bone is too thin for its wavelength to be told from one without thickness, or a number is out \
+             of scale",
         )
     }
 }
@@ -82,14 +87,14 @@ impl Solver {
         isa.run(FillPlate { medium: &medium, thickness, plate: &mut plate });
         let frequency = self.setup().probe.center_frequency;
         let symmetry = Symmetry::new(bone);
-        let mut free_plate = FreePlate { isa, medium: &medium, plate };
+        let mut free_plate = FreePlate { isa, medium: &medium, plate, thickness };
         let flexural = Family::new(symmetry, FLEXURAL);
         let extensional = Family::new(symmetry, EXTENSIONAL);
         let rank = extensional.rank_of_extensional(&medium);
         GuidedWaves {
             frequency,
-            a0: free_plate.wave(&flexural, 1, TAU * frequency),
-            s0: free_plate.wave(&extensional, rank, TAU * frequency),
+            a0: free_plate.wave(&flexural, 1, TAU * frequency, THINNEST_FLEXURAL),
+            s0: free_plate.wave(&extensional, rank, TAU * frequency, THINNEST_EXTENSIONAL),
         }
     }
 }
@@ -181,12 +186,21 @@ struct FreePlate<'a> {
     isa: Isa,
     medium: &'a Medium,
     plate: AccuratePlate,
+    /// Thickness, m.
+    thickness: f64,
 }
 
 impl FreePlate<'_> {
     /// Returns the wave of this rank in a family at `omega`, rad/s: the first wavenumber at which its
-    /// frequency, which rises from zero, is `omega`.
-    fn wave(&mut self, family: &Family, rank: u64, omega: f64) -> Option<GuidedWave> {
+    /// frequency, which rises from zero, is `omega`. `None` if its product with the thickness is below
+    /// `thinnest`.
+    fn wave(
+        &mut self,
+        family: &Family,
+        rank: u64,
+        omega: f64,
+        thinnest: f64,
+    ) -> Option<GuidedWave> {
         // No wave that has no cut-off frequency is faster: the displacement that is the same at all
         // depths bounds its frequency from above.
         let mut low = BELOW_LEAST * omega / self.medium.fastest;
@@ -202,6 +216,9 @@ impl FreePlate<'_> {
             low = high;
         }
         let k = halved((low, high), |k| Some(self.count(family, k, omega)? < rank))?;
+        if k * self.thickness < thinnest {
+            return None;
+        }
         let step = GROUP_STEP * k;
         let reach = 2.0 * self.medium.fastest * step;
         let mut at = |k: f64| {
@@ -215,7 +232,7 @@ impl FreePlate<'_> {
     /// Returns the number of waves of a family whose frequency at `k` (rad/m) is below `omega` (rad/s);
     /// `None` if a number is not finite.
     fn count(&mut self, family: &Family, k: f64, omega: f64) -> Option<u64> {
-        let Self { isa, medium, plate } = self;
+        let Self { isa, medium, plate, .. } = self;
         let mut at = |k: f64| isa.run(CountWaves { medium, plate, family, k, omega });
         at(k).or_else(|| at(BESIDE * k))
     }
