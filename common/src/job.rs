@@ -191,6 +191,12 @@ impl JobSpecification {
         Parameter::OF_BONE.into_iter().chain(searched)
     }
 
+    /// Returns the parameters that are searched.
+    pub fn free(&self) -> impl Iterator<Item = Parameter> + '_ {
+        let is_free = |parameter: &Parameter| matches!(self.range(*parameter), Range::Free { .. });
+        Parameter::ALL.into_iter().filter(is_free)
+    }
+
     /// Returns the contribution of the priors to the cost of a point: the sum of w (p -
     /// prior)²/(upper - lower)² (Tikhonov regularisation).
     pub fn penalty(&self, point: &Point) -> f64 {
@@ -214,8 +220,7 @@ impl JobSpecification {
         if self.kind == JobKind::Propagation {
             return 1;
         }
-        let free = self.parameters.iter().filter(|range| matches!(range, Range::Free { .. }));
-        let free = free.count() as u64;
+        let free = self.free().count() as u64;
         let measured = if self.search.sensitivities && self.is_searched() { free } else { 0 };
         let sampled = self.posterior.map_or(0, |posterior| posterior.max_evaluations);
         let sets = self.data.as_ref().map_or(1, Data::searched) as u64;

@@ -7,6 +7,7 @@
 //! worker, a clock or a file: a search is a function of its specification and of the outcomes
 //! passed to it.
 
+mod expected;
 mod identify;
 pub mod newton;
 mod posterior;
@@ -15,5 +16,6 @@ mod search;
 pub mod search_box;
 pub mod simplex;
 
+pub use expected::ExpectedEvaluations;
 pub use identify::{CompletedJob, IdentifyError, Realizations, identify};
 pub use search::{Ending, ReplayError, Search, Step, Summary, same_point};
