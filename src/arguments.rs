@@ -1,5 +1,6 @@
 //! The command line as typed. What it means is decided in [`crate::resolved`].
 
+mod check;
 mod operators;
 
 use std::path::PathBuf;
@@ -10,6 +11,7 @@ use osteon_proto::endpoint::Endpoint;
 
 use crate::program;
 
+pub(crate) use check::CheckArguments;
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
@@ -30,6 +32,8 @@ pub(crate) enum Command {
     Propagate(RunArguments),
     /// Solve one case: picked times, velocity, and with --out the pressure traces
     Simulate(SimulateArguments),
+    /// Check a job file, and estimate what the job costs on this machine
+    Check(CheckArguments),
     /// Draw one random realization of a job and print it as a case file
     Draw(DrawArguments),
     /// Run a coordinator: accept jobs from clients and distribute them to workers, until interrupted

@@ -1,6 +1,7 @@
 //! The subcommands: one file per command, or per family of commands.
 
 mod certs;
+mod check;
 mod coordinator;
 mod draw;
 mod jobs;
@@ -24,10 +25,13 @@ const NOTHING_LEFT: &str = "nothing was changed";
 /// If the command fails.
 pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
     match resolved {
-        Resolved::Run(run) => run::run(run).await,
+        Resolved::Run { run, isa } => run::run(run, isa).await,
         Resolved::Simulate { arguments, isa } => {
             let left = "no results were saved";
             unless_interrupted(simulate::simulate(arguments, isa), left).await
+        }
+        Resolved::Check { arguments, isa, cores } => {
+            unless_interrupted(check::check(arguments, isa, cores), NOTHING_LEFT).await
         }
         Resolved::Draw(arguments) => draw::draw(&arguments),
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,

@@ -7,6 +7,7 @@ mod arguments;
 mod certificates;
 mod client;
 mod commands;
+mod cost;
 mod embedded;
 mod environment;
 mod exit_status;

@@ -13,8 +13,9 @@ use osteon_common::sampling::NominalSampling;
 use osteon_files::report::{ResultFile, Solver};
 use osteon_proto::v1::{BackupEnd, BannedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot};
 use osteon_solver::check::Check;
-use osteon_solver::{Arrival, Failure, FirstSignal, GuidedWaves};
+use osteon_solver::{Arrival, Failure, FirstSignal, GuidedWaves, Isa};
 
+use crate::cost::JobCost;
 use crate::resolved::OutputFormat;
 
 /// A result to show.
@@ -45,6 +46,17 @@ pub(crate) struct ShownSimulation<'a> {
     pub(crate) check: Option<&'a Check>,
 }
 
+/// The estimated cost of a job to show.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShownCost<'a> {
+    /// The job.
+    pub(crate) specification: &'a JobSpecification,
+    /// Its cost.
+    pub(crate) cost: &'a JobCost,
+    /// The instruction set on which it was measured.
+    pub(crate) isa: Isa,
+}
+
 /// Returns the object `solver` of one solved case, with the sampling that was decisive, if known.
 fn solver_of(setup: &Setup, arrival: Option<&Arrival>) -> Solver<Option<f64>> {
     let error = arrival.map(|arrival| arrival.estimated_error);
@@ -65,6 +77,8 @@ pub(crate) trait Output {
     fn result(&mut self, result: &ShownResult<'_>) -> io::Result<()>;
     /// Prints the outcome of one case.
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()>;
+    /// Prints what a job will do and cost.
+    fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()>;
     /// Prints the id of an accepted job.
     fn submitted(&mut self, job: &str) -> io::Result<()>;
     /// Prints all jobs, and the workers that are banned.

@@ -11,9 +11,10 @@ use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
-    Arguments, CertsArguments, ClientArguments, Command, CoordinatorArguments, CredentialArguments,
-    DrawArguments, JobsArguments, JobsCommand, RunArguments, SchemaArguments, SimulateArguments,
-    SubmitArguments, TokenArguments, WorkerArguments, WorkersArguments, WorkersCommand,
+    Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
+    CredentialArguments, DrawArguments, JobsArguments, JobsCommand, RunArguments, SchemaArguments,
+    SimulateArguments, SubmitArguments, TokenArguments, WorkerArguments, WorkersArguments,
+    WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
@@ -36,13 +37,27 @@ pub(crate) enum OutputFormat {
 #[derive(Debug)]
 pub(crate) enum Resolved {
     /// `identify`, `propagate`.
-    Run(Run),
+    Run {
+        /// The run.
+        run: Run,
+        /// The instruction set to compute on, on this machine.
+        isa: Option<Isa>,
+    },
     /// `simulate`.
     Simulate {
         /// The case and the requested output.
         arguments: SimulateArguments,
         /// The instruction set to compute on.
         isa: Isa,
+    },
+    /// `check`.
+    Check {
+        /// The job.
+        arguments: CheckArguments,
+        /// The instruction set to compute on.
+        isa: Isa,
+        /// Number of this machine's cores.
+        cores: u32,
     },
     /// `draw`.
     Draw(DrawArguments),
@@ -205,16 +220,18 @@ impl Resolved {
             || Isa::chosen(std::env::var_os(Isa::VARIABLE)).map_err(CommandFailure::bad_input);
         let run = |kind, run| {
             let run = resolve_run(kind, run, cores, &environment)?;
-            if matches!(run.location, RunLocation::Local { .. }) {
-                // Workers read the variable again, but an invalid value is reported here, at once.
-                isa()?;
-            }
-            Ok::<_, CommandFailure>(Self::Run(run))
+            // Workers read the variable again, but an invalid value is reported here, at once.
+            let isa = match run.location {
+                RunLocation::Local { .. } => Some(isa()?),
+                RunLocation::Coordinator(_) => None,
+            };
+            Ok::<_, CommandFailure>(Self::Run { run, isa })
         };
         Ok(match arguments.command {
             Command::Identify(arguments) => run(JobKind::Identification, arguments)?,
             Command::Propagate(arguments) => run(JobKind::Propagation, arguments)?,
             Command::Simulate(arguments) => Self::Simulate { arguments, isa: isa()? },
+            Command::Check(arguments) => Self::Check { arguments, isa: isa()?, cores },
             Command::Draw(arguments) => Self::Draw(arguments),
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
             Command::Worker(arguments) => {

@@ -5,6 +5,7 @@ mod key_tables;
 mod parameters;
 mod posterior;
 mod priors;
+mod purpose;
 mod schema;
 
 use std::path::{Path, PathBuf};
@@ -23,6 +24,7 @@ use crate::file_error::{self, Bound, ContentError, FileError};
 use crate::reader::{self, Reader, Table};
 
 pub use self::key_tables::{job_table, setup_table};
+pub use self::purpose::{FilePurpose, purpose};
 pub use self::schema::schema;
 pub use crate::toml_text::job as to_toml;
 

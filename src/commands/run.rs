@@ -11,6 +11,7 @@ use osteon_files::job_file;
 use osteon_files::report::ResultFile;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::v1::JobSnapshot;
+use osteon_solver::Isa;
 
 use crate::client::{Client, Fetched, Remote, SubmitOptions};
 use crate::embedded::{Embedded, StoreLocation};
@@ -22,10 +23,10 @@ use crate::request_id::RequestId;
 use crate::resolved::{Run, RunLocation};
 use crate::results_directory::ResultsDirectory;
 use crate::signals;
-use crate::{result_status, unsearched_groups, warnings};
+use crate::{cost, result_status, unsearched_groups, warnings};
 
 /// Runs the job, or shows the result of an earlier run.
-pub(super) async fn run(run: Run) -> Result<ExitStatus, CommandFailure> {
+pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, CommandFailure> {
     let noted =
         job_file::read_with_warnings(&run.job, run.kind).map_err(CommandFailure::bad_input)?;
     let specification = &noted.specification;
@@ -40,6 +41,10 @@ pub(super) async fn run(run: Run) -> Result<ExitStatus, CommandFailure> {
     }
     unsearched_groups::warn(&run.job, &noted);
     warnings::say_of_job(specification, &noted.warnings).await;
+    if let (RunLocation::Local { workers, threads }, Some(isa)) = (&run.location, isa) {
+        let threads = workers.saturating_mul(*threads);
+        cost::say_if_remarkable(specification, isa, threads).await;
+    }
     let mut interruption = pin!(signals::interruption()?);
     // Connected first, so that an address that does not answer leaves no directory behind.
     let location = tokio::select! {

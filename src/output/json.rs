@@ -1,5 +1,7 @@
 //! Output for programs: one JSON value per command, without inf or NaN.
 
+mod cost;
+
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -15,7 +17,7 @@ use osteon_solver::check::{Difference, MethodSolution};
 use osteon_solver::{FirstSignal, GuidedWave, GuidedWaves};
 use serde_json::{Value, json};
 
-use super::{Output, ShownResult, ShownSimulation, solver_of};
+use super::{Output, ShownCost, ShownResult, ShownSimulation, solver_of};
 use crate::output::text::operators::worker_state_name;
 use crate::output::text::{kind_name, state_name, status_name};
 use crate::output::times::utc;
@@ -44,6 +46,10 @@ impl Output for JsonOutput<'_> {
 
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
         self.verbatim(&self::simulation(simulation))
+    }
+
+    fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()> {
+        self.value(&cost::value(cost))
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {

@@ -1,6 +1,7 @@
 //! Output as text for people.
 
 mod check;
+mod cost;
 mod data_notes;
 mod fit;
 mod groups;
@@ -23,7 +24,7 @@ use osteon_proto::v1::{
 
 use self::layout::{WIDTH, aligned, glued, wrapped};
 use self::number::significant;
-use super::{Output, ShownResult, ShownSimulation};
+use super::{Output, ShownCost, ShownResult, ShownSimulation};
 use crate::client;
 use crate::progress::{JobProgress, line, span};
 
@@ -48,6 +49,10 @@ impl Output for TextOutput<'_> {
 
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
         self.verbatim(&simulation::table(simulation))
+    }
+
+    fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()> {
+        self.verbatim(&cost::table(cost))
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {

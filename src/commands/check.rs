@@ -1,0 +1,40 @@
+//! `check`: reads a job as the commands that run it do, and estimates what it costs.
+
+use anyhow::anyhow;
+use osteon_common::job::JobKind;
+use osteon_common::visible;
+use osteon_files::job_file::{self, FilePurpose};
+use osteon_solver::Isa;
+
+use crate::arguments::CheckArguments;
+use crate::cost::{Effort, JobCost};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
+use crate::output::{self, ShownCost};
+use crate::{resolved, unsearched_groups, warnings};
+
+/// Checks the job, and prints what it will do and cost.
+pub(super) async fn check(
+    arguments: CheckArguments,
+    isa: Isa,
+    cores: u32,
+) -> Result<ExitStatus, CommandFailure> {
+    let CheckArguments { job, propagate, json } = arguments;
+    let kind = match job_file::purpose(&job).map_err(CommandFailure::bad_input)? {
+        FilePurpose::Case => {
+            return Err(CommandFailure::bad_input(anyhow!(
+                "{} is a case file, which describes one bone, and no job; `osteon simulate` solves it",
+                visible::path(&job)
+            )));
+        }
+        FilePurpose::Job(_) if propagate => JobKind::Propagation,
+        FilePurpose::Job(kind) => kind,
+    };
+    let noted = job_file::read_with_warnings(&job, kind).map_err(CommandFailure::bad_input)?;
+    let specification = &noted.specification;
+    unsearched_groups::warn(&job, &noted);
+    warnings::say_of_job(specification, &noted.warnings).await;
+    let cost = JobCost::measure(specification, isa, Effort::THOROUGH, cores).await;
+    let shown = ShownCost { specification, cost: &cost, isa };
+    output::stdout(resolved::format(json)).cost(&shown).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
+}
