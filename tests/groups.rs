@@ -125,6 +125,68 @@ fn a_group_is_identified_as_it_would_be_alone() {
     assert!(read(&out, "history.csv").lines().nth(1).unwrap().ends_with(",bone 0"));
 }
 
+/// The thickness of each bone, and the coupling's sound speed on the day of its measurement, are columns
+/// of the file.
+#[test]
+fn a_group_has_the_setup_that_is_known_of_it() {
+    let scratch = Scratch::new();
+    let known = [(3850.0, 3.2e-3, 1480.0), (3860.0, 4.5e-3, 1510.0)];
+    let mut csv = "velocity,bone,cortex,water\n".to_owned();
+    for (bone, (mean, thickness, speed)) in known.into_iter().enumerate() {
+        for velocity in velocities(mean) {
+            csv.push_str(&format!("{velocity},bone {bone},{thickness},{speed}\n"));
+        }
+    }
+    scratch.write("velocities.csv", &csv);
+    let data = "[data]\nvelocities = \"velocities.csv\"\ngroup = \"bone\"\n\
+                known = { bone_thickness = \"cortex\", coupling_sound_speed = \"water\" }\n";
+    let job = scratch.write("job.toml", &by_newton().replace(DATA, data));
+    let out = scratch.path("out");
+    run(&["identify", text(&job), "--out", text(&out)]).succeeded();
+    let result: Value = serde_json::from_str(&read(&out, "result.json")).unwrap();
+    let rows = table(&read(&out, "realizations.csv"));
+    for (bone, (mean, thickness, speed)) in known.into_iter().enumerate() {
+        let alone = format!("[data]\nvelocities = {:?}\n", velocities(mean));
+        let alone = by_newton().replace(DATA, &alone);
+        let layers = format!(
+            "{alone}[layers]\nbone = {{ thickness = {thickness} }}\ncoupling = {{ sound_speed = {speed} }}\n"
+        );
+        let alone = scratch.write("alone.toml", &layers);
+        let out = scratch.path(&format!("alone {bone}"));
+        let alone = run(&["identify", text(&alone), "--json", "--out", text(&out)]).json();
+        let found = &result["groups"][bone];
+        for key in ["cost", "dispersion", "velocity", "failures", "sensitivities", "identified"] {
+            assert_eq!(found[key], alone[key], "{key} of bone {bone}");
+        }
+        assert_eq!(found["parameters"]["bone_thickness"].as_f64(), Some(thickness));
+        assert_eq!(found["parameters"]["coupling_sound_speed"].as_f64(), Some(speed));
+        // The velocities are the same to the bit, which their decimals show.
+        let name = format!("bone {bone}");
+        let of_group = rows.iter().filter(|row| row["group"] == name);
+        let of_group: Vec<&String> = of_group.map(|row| &row["velocity"]).collect();
+        let alone = table(&read(&out, "realizations.csv"));
+        assert_eq!(of_group, alone.iter().map(|row| &row["velocity"]).collect::<Vec<_>>());
+        assert_eq!(of_group.len(), 32);
+        let row = &table(&read(&scratch.path("out"), "groups.csv"))[bone];
+        let number = |column: &str| row[column].parse::<f64>().unwrap();
+        assert_eq!(number("best_bone_thickness"), thickness);
+        assert_eq!(number("best_coupling_sound_speed"), speed);
+    }
+    // A realization of a group has its setup; the same command shows the result again.
+    let draw = ["draw", text(&job), "--index", "5", "--at", text(&out), "--group", "bone 1"];
+    assert!(run(&draw).succeeded().contains("bone = { thickness = 0.0045 }"));
+    let history = table(&read(&out, "history.csv"));
+    assert!(
+        history.iter().any(|row| row["bone_thickness"] == "0.0032" && row["group"] == "bone 0")
+    );
+    let again = run(&["identify", text(&job), "--out", text(&out), "--json"]).json();
+    assert_eq!(again, result);
+    // The job that was run has the values inlined.
+    let inlined = out.join("job.toml");
+    let again = run(&["identify", text(&inlined), "--json"]).json();
+    assert_eq!(again["digest"], result["digest"]);
+}
+
 #[test]
 fn a_realization_is_drawn_at_the_best_point_of_its_group() {
     let scratch = Scratch::new();

@@ -5,6 +5,7 @@
 
 mod data;
 mod job;
+mod known_quantities;
 mod posterior;
 mod priors;
 mod random_quantities;

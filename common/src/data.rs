@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 
 use thiserror::Error;
 
+use crate::known_quantities::KnownQuantities;
+
 /// The measured velocities, or their moments, with the instrument's own scatter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Data {
@@ -50,6 +52,8 @@ pub struct Group {
     /// Subject of each velocity, from 0, numbered by [`numbered`]: velocities of one subject are
     /// not independent. `None` if all velocities are independent.
     pub subjects: Option<Vec<u32>>,
+    /// Quantities of the setup that are known of this group; the same ones of all groups of a job.
+    pub known: KnownQuantities,
 }
 
 /// The velocities of one set, with what is known of their noise.
@@ -95,7 +99,8 @@ pub fn numbered<T: Ord>(names: impl IntoIterator<Item = T>) -> Vec<u32> {
 impl Group {
     /// Creates a group of independent velocities, m/s.
     pub fn new(name: impl Into<String>, velocities: Vec<f64>) -> Self {
-        Self { name: name.into(), velocities, subjects: None }
+        let known = KnownQuantities::default();
+        Self { name: name.into(), velocities, subjects: None, known }
     }
 
     /// Returns the reason why this group cannot be searched; `None` if it can.
@@ -166,6 +171,11 @@ impl Data {
     pub fn searched_sets(&self) -> impl Iterator<Item = usize> {
         let unsearched = |set: &usize| self.groups().get(*set).and_then(Group::no_variation);
         (0..self.sets()).filter(move |set| unsearched(set).is_none())
+    }
+
+    /// Returns the quantities of the setup that are known of a set, by its number.
+    pub fn known(&self, set: usize) -> KnownQuantities {
+        self.groups().get(set).map(|group| group.known).unwrap_or_default()
     }
 
     /// Returns the name of each group; none if the data are not grouped.

@@ -183,12 +183,45 @@ impl JobSpecification {
         self.parameters[parameter as usize]
     }
 
-    /// Returns the parameters that the job has: all of the bone, and those of the setup that are
-    /// searched.
-    pub fn parameters_given(&self) -> impl Iterator<Item = Parameter> + '_ {
+    /// Returns the parameters that have a range of their own: all of the bone, and those of the setup
+    /// that are searched.
+    pub fn parameters_ranged(&self) -> impl Iterator<Item = Parameter> + '_ {
         let is_free = |parameter: &Parameter| matches!(self.range(*parameter), Range::Free { .. });
         let searched = Parameter::OF_SETUP.into_iter().filter(is_free);
         Parameter::OF_BONE.into_iter().chain(searched)
+    }
+
+    /// Returns the parameters that points of an identification have: those with a range, and quantities
+    /// of the setup that are known of each group.
+    pub fn parameters_given(&self) -> impl Iterator<Item = Parameter> + '_ {
+        // All groups have the same ones.
+        let known = self.data.as_ref().map(|data| data.known(0)).unwrap_or_default();
+        let has = move |parameter: &Parameter| {
+            let is_free = matches!(self.range(*parameter), Range::Free { .. });
+            is_free || known.get(*parameter).is_some()
+        };
+        Parameter::OF_BONE.into_iter().chain(Parameter::OF_SETUP.into_iter().filter(has))
+    }
+
+    /// Returns the ranges for set number `set` of the data: what is known of it is fixed.
+    pub fn ranges_of(&self, set: usize) -> [Range; PARAMETERS] {
+        let mut ranges = self.parameters;
+        let known = self.data.as_ref().map(|data| data.known(set)).unwrap_or_default();
+        for (parameter, value) in known.given() {
+            ranges[parameter as usize] = Range::Fixed(value);
+        }
+        ranges
+    }
+
+    /// Returns the point of fixed values and starts for set number `set` of the data.
+    pub fn start_of(&self, set: usize) -> Point {
+        Point(self.ranges_of(set).map(|range| range.start()))
+    }
+
+    /// Returns the specification of the search for set number `set` of the data, without data.
+    #[must_use]
+    pub fn of_set(&self, set: usize) -> Self {
+        Self { data: None, parameters: self.ranges_of(set), ..*self }
     }
 
     /// Returns the parameters that are searched.

@@ -28,6 +28,7 @@ pub mod fields;
 pub mod germ_source;
 pub mod inference;
 pub mod job;
+pub mod known_quantities;
 pub mod layers;
 pub mod limits;
 pub mod moments;

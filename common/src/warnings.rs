@@ -64,10 +64,11 @@ pub fn job_warnings_from(
 ) -> Vec<Warning> {
     let mut warnings = Warnings::default();
     warnings.setup(&specification.setup);
-    for parameter in specification.parameters_given() {
+    for parameter in specification.parameters_ranged() {
         warnings.parameter(parameter, specification.range(parameter));
     }
     if let Some(data) = &specification.data {
+        warnings.known(data);
         warnings.data(data, origin);
     }
     warnings.0
@@ -120,6 +121,20 @@ impl Warnings {
         };
         let field = format!("parameters.{}.{key}", parameter.name());
         self.number(&field, range.start(), &PlausibleRange::of(parameter));
+    }
+
+    /// Names, for each quantity that is known of the groups, the first group whose value is unusual.
+    fn known(&mut self, data: &Data) {
+        for parameter in Parameter::OF_SETUP {
+            let range = PlausibleRange::of(parameter);
+            let doubt = data.groups().iter().find_map(|group| {
+                let doubt = range.doubt(group.known.get(parameter)?)?;
+                Some(format!("that of the group {:?} {doubt}", group.name))
+            });
+            if let Some(doubt) = doubt {
+                self.add(&format!("data.known.{}", parameter.name()), doubt);
+            }
+        }
     }
 
     fn data(&mut self, data: &Data, origin: Option<&Origin>) {

@@ -111,7 +111,10 @@ pub fn groups(
             fields.push(number(quantity.map(|quantity| quantity.value)));
             fields.extend(ends(quantity.and_then(|quantity| quantity.interval)));
         }
-        let of_best = |name| number(best.map(|best| best.point.get(name)));
+        let known = specification.data.as_ref().map(|data| data.known(set)).unwrap_or_default();
+        let of_best = |name: Parameter| {
+            number(known.get(name).or_else(|| best.map(|best| best.point.get(name))))
+        };
         fields.extend(specification.parameters_given().map(of_best));
         fields.extend(free.iter().flat_map(|&name| identified(name, group)));
         fields.extend(measured(group));

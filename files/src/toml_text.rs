@@ -36,7 +36,7 @@ pub fn job(specification: &JobSpecification) -> String {
         if let Some(given) = &specification.data {
             data(out, given)?;
         }
-        for parameter in specification.parameters_given() {
+        for parameter in specification.parameters_ranged() {
             range(out, parameter, specification.range(parameter))?;
         }
         run(out, specification)
@@ -143,11 +143,19 @@ fn data(out: &mut String, data: &Data) -> fmt::Result {
     if data.is_grouped() { groups(out, data.groups()) } else { Ok(()) }
 }
 
-/// Writes groups in their order: as lists of one table, or, if any has subjects, each as a table.
+/// Writes groups in their order: as lists of one table, or, if any has more than velocities, each as a
+/// table.
 fn groups(out: &mut String, groups: &[Group]) -> fmt::Result {
-    if groups.iter().any(|group| group.subjects.is_some()) {
+    if groups.iter().any(|group| group.subjects.is_some() || !group.known.is_empty()) {
         return groups.iter().try_for_each(|group| {
             writeln!(out, "\n[data.groups.{}]  # m/s", quoted(&group.name))?;
+            for (parameter, value) in group.known.given() {
+                write!(out, "{} = {value:?}", parameter.name())?;
+                match parameter.unit() {
+                    "" => writeln!(out)?,
+                    unit => writeln!(out, "  # {unit}")?,
+                }
+            }
             set(out, &group.velocities, group.subjects.as_deref())
         });
     }

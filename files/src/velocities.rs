@@ -14,7 +14,9 @@ use std::path::{Path, PathBuf};
 
 use osteon_common::check::VELOCITIES_MIN;
 use osteon_common::job::Group;
+use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::origin::Origin;
+use osteon_common::parameters::Parameter;
 use osteon_common::{limits, visible};
 use thiserror::Error;
 
@@ -112,9 +114,10 @@ fn parse(
         match lines.next() {
             Ok(None) => break,
             Ok(Some((number, line))) => match columns.row(line) {
-                Ok(row) => {
-                    gathered.add(number, row).map_err(|problem| vec![(None, problem)])?;
-                }
+                Ok(row) => match gathered.contradiction(&row, &columns) {
+                    Some(problem) => problems.push((Some(number), problem)),
+                    None => gathered.add(number, row).map_err(|problem| vec![(None, problem)])?,
+                },
                 Err(problem) => problems.push((Some(number), problem)),
             },
             // After this error, the rest of the file cannot be interpreted.
@@ -206,9 +209,29 @@ struct CollectedGroup {
     subjects: Vec<u32>,
     /// Numbers of the subjects, by their names.
     numbers: BTreeMap<String, u32>,
+    /// Quantities that are known of the group.
+    known: [Option<f64>; Parameter::OF_SETUP.len()],
 }
 
 impl CollectedVelocities {
+    /// Returns how a row contradicts what is known of its group from the first of its rows.
+    fn contradiction(&self, row: &Row, columns: &Columns) -> Option<Problem> {
+        let group = &self.groups[*self.places.get(&row.group)?];
+        let pairs = group.known.iter().zip(row.known).enumerate();
+        let mut different = pairs.filter_map(|(quantity, (first, found))| {
+            let (first, found) = ((*first)?, found?);
+            (first.to_bits() != found.to_bits()).then_some((quantity, first, found))
+        });
+        let (quantity, first, found) = different.next()?;
+        Some(Problem::OtherKnownValue {
+            column: shortened(columns.known(quantity)),
+            found,
+            first,
+            line: group.lines.first().copied().unwrap_or_default(),
+            group: shortened(&row.group),
+        })
+    }
+
     fn add(&mut self, line: usize, row: Row) -> Result<(), Problem> {
         self.count += 1;
         if self.count > limits::DATA_VELOCITIES_MAX {
@@ -221,7 +244,7 @@ impl CollectedVelocities {
             Some(&place) => place,
             None if self.groups.len() == limits::GROUPS_MAX => return Err(Problem::TooManyGroups),
             None => {
-                self.groups.push(CollectedGroup::new(row.group.clone()));
+                self.groups.push(CollectedGroup::new(row.group.clone(), row.known));
                 self.places.insert(row.group, self.groups.len() - 1);
                 self.groups.len() - 1
             }
@@ -247,9 +270,10 @@ impl CollectedVelocities {
             lines: Vec::with_capacity(self.groups.len()),
         };
         let mut measured = Measured { data: Vec::with_capacity(self.groups.len()), origin };
-        for CollectedGroup { name, velocities, lines, subjects, .. } in self.groups {
+        for CollectedGroup { name, velocities, lines, subjects, known, .. } in self.groups {
             let subjects = self.has_subjects.then_some(subjects);
-            measured.data.push(Group { name, velocities, subjects });
+            let known = KnownQuantities::new(known);
+            measured.data.push(Group { name, velocities, subjects, known });
             measured.origin.lines.push(lines);
         }
         measured
@@ -257,9 +281,9 @@ impl CollectedVelocities {
 }
 
 impl CollectedGroup {
-    fn new(name: String) -> Self {
+    fn new(name: String, known: [Option<f64>; Parameter::OF_SETUP.len()]) -> Self {
         let (velocities, lines, subjects) = (Vec::new(), Vec::new(), Vec::new());
-        Self { name, velocities, lines, subjects, numbers: BTreeMap::new() }
+        Self { name, velocities, lines, subjects, numbers: BTreeMap::new(), known }
     }
 
     /// Adds the subject of a velocity; returns whether it is a new one.

@@ -385,7 +385,7 @@ fn as_json(text: &str) -> String {
 
 /// Subjects are numbered anew, and the canonical text is read as it is written.
 #[test]
-fn noise_of_the_data_is_inlined() {
+fn what_is_known_of_the_data_is_inlined() {
     let given = "velocities = [3900.5, 4000, 3950.25]";
     let grouped = "groups.b = { velocities = [3900, 4000, 3950], subjects = [9, 3, 9] }\n\
                    groups.a = [3900.0, 4000.0]\nrepeatability = 2";
@@ -402,6 +402,15 @@ fn noise_of_the_data_is_inlined() {
              [data.groups.\"b\"]  # m/s\nvelocities = [\n    3900.0, 4000.0, 3950.0,\n]\n\
              subjects = [\n    0, 1, 0,\n]\n\n\
              [data.groups.\"a\"]  # m/s\nvelocities = [\n    3900.0, 4000.0,\n]\n",
+        ),
+        (
+            "groups.b = { velocities = [3900, 4000], coupling_sound_speed = 1480, bone_thickness = 3e-3 }\n\
+             groups.a = { velocities = [3900], bone_thickness = 4e-3, coupling_sound_speed = 1500.5 }"
+                .to_owned(),
+            "[data.groups.\"b\"]  # m/s\nbone_thickness = 0.003  # m\ncoupling_sound_speed = 1480.0  # m/s\n\
+             velocities = [\n    3900.0, 4000.0,\n]\n\n\
+             [data.groups.\"a\"]  # m/s\nbone_thickness = 0.004  # m\ncoupling_sound_speed = 1500.5  # m/s\n\
+             velocities = [\n    3900.0,\n]\n",
         ),
         (
             moments.to_owned(),

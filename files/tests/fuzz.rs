@@ -56,21 +56,27 @@ fn check_case(text: &str) {
     }
 }
 
-/// The velocities go through a job whose file they are.
+/// The velocities go through a job whose file they are, also in groups of which quantities are known.
 fn check_velocities(csv: &[u8]) {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("v.csv"), csv).unwrap();
-    let text = include_str!("files/job.toml")
-        .replace("velocities = [3900.5, 4000, 3950.25]", "velocities = \"v.csv\"");
-    let kind = JobKind::Identification;
-    let read = || job_file::parse(&text, Format::Toml, directory.path(), kind);
-    match bounded(csv.len(), read) {
-        Ok(job) => {
-            let written = job_file::to_toml(&job);
-            let again = job_file::parse(&written, Format::Toml, Path::new(""), kind).unwrap();
-            assert_eq!(again, job);
+    for more in
+        ["", "\ngroup = \"bone\"", "\ngroup = \"bone\"\nknown = { bone_thickness = \"cortex\" }"]
+    {
+        let text = include_str!("files/job.toml").replace(
+            "velocities = [3900.5, 4000, 3950.25]",
+            &format!("velocities = \"v.csv\"{more}"),
+        );
+        let kind = JobKind::Identification;
+        let read = || job_file::parse(&text, Format::Toml, directory.path(), kind);
+        match bounded(csv.len(), read) {
+            Ok(job) => {
+                let written = job_file::to_toml(&job);
+                let again = job_file::parse(&written, Format::Toml, Path::new(""), kind).unwrap();
+                assert_eq!(again, job);
+            }
+            Err(error) => check_refusal(&error),
         }
-        Err(error) => check_refusal(&error),
     }
 }
 

@@ -64,11 +64,8 @@ fn what_is_read() {
 fn groups_stand_in_the_order_in_which_they_begin() {
     let text = "bone,velocity\nleft,3900.5\nright,4000\n\"left\",3950\nright,4010\n";
     let groups = [("left", [3900.5, 3950.0]), ("right", [4000.0, 4010.0])];
-    let group = |(name, velocities): (&str, [f64; 2])| Group {
-        name: name.to_owned(),
-        velocities: velocities.to_vec(),
-        subjects: None,
-    };
+    let group =
+        |(name, velocities): (&str, [f64; 2])| Group::new(name.to_owned(), velocities.to_vec());
     let expected = Data::from_groups(groups.map(group).to_vec());
     assert_eq!(read_as(text.as_bytes(), "group = \"bone\""), Ok(Some(expected)));
 }
@@ -98,6 +95,72 @@ fn subjects_are_numbered_in_each_group() {
     ] {
         assert_eq!(subjects(more), expected, "{more}");
     }
+}
+
+#[test]
+fn what_is_known_of_each_group_is_a_column() {
+    let text = "q,bone,t,velocity\n15,a,3e-3,3900\n20.5,b,0.0041,3910\n15.0,a,0.003,3920\n";
+    let known = |more: &str| -> [Vec<(&str, f64)>; 2] {
+        let data = read_as(text.as_bytes(), &format!("group = \"bone\"\n{more}")).unwrap().unwrap();
+        [0, 1].map(|set| data.known(set).given().map(|(one, value)| (one.name(), value)).collect())
+    };
+    let nothing: [Vec<(&str, f64)>; 2] = [vec![], vec![]];
+    assert_eq!(known(""), nothing);
+    let thickness = [vec![("bone_thickness", 3e-3)], vec![("bone_thickness", 0.0041)]];
+    assert_eq!(known("known = { bone_thickness = \"t\" }"), thickness);
+    let both = known("[data.known]\nbone_quality_factor = \"q\"\nbone_thickness = \"t\"");
+    assert_eq!(both[1], [("bone_thickness", 0.0041), ("bone_quality_factor", 20.5)]);
+}
+
+#[test]
+fn known_values_that_are_refused() {
+    let check = |rows: &str, expected: &str| {
+        let more = "group = \"bone\"\nknown = { bone_thickness = \"t\" }";
+        let csv = format!("bone,t,velocity\n{rows}b,4e-3,3900\nb,4e-3,3910\n");
+        let message = read_as(csv.as_bytes(), more).unwrap_err();
+        assert!(message.contains(expected), "{message}");
+    };
+    let file = "data.velocities: DIR/data/v.csv, line";
+    let rule = "it must be a number (SI units), the same in all rows of a group";
+    check("a,,3900\n", &format!("{file} 2: t is empty; {rule}"));
+    check("a,3 mm,3900\n", &format!("{file} 2: t is \"3 mm\"; {rule}"));
+    check("a,inf,3900\n", &format!("{file} 2: t is \"inf\"; {rule}"));
+    check(
+        "a,3e-3,3900\nb,4e-3,3905\na,3.1e-3,3910\n",
+        &format!(
+            "{file} 4: t is 0.0031, and 0.003 in line 2; all rows of the group \"a\" must have the same \
+             value"
+        ),
+    );
+    let place = "data.known.bone_thickness: DIR/data/v.csv, line 4: the value";
+    let of_group = "of the group \"a\" is refused: layers.bone.thickness: is";
+    for (value, expected) in [
+        ("3.0", format!("{place} 3.0 {of_group} 3.0; values are in m: did you mean 3 mm (3e-3)?")),
+        ("0", format!("{place} 0.0 {of_group} 0.0; it must be above 0")),
+        ("-1e-3", format!("{place} -0.001 {of_group} -0.001; it must be above 0")),
+    ] {
+        check(&format!("b,4e-3,3900\nb,4e-3,3910\na,{value},3900\n"), &expected);
+    }
+    let columns = |more: &str, expected: &str| {
+        let message = read_as(b"bone,t,velocity\na,3e-3,3900\na,3e-3,3910\n", more).unwrap_err();
+        assert!(message.contains(expected), "{message}");
+    };
+    columns(
+        "known = { bone_thickness = \"t\" }",
+        "data.known: has a value for each group, and there are no groups; name their column: group = \"…\"",
+    );
+    columns(
+        "group = \"bone\"\nknown = { bone_thickness = \"d\" }",
+        "line 1: no column `d`; the header has `bone`, `t`, `velocity`",
+    );
+    columns(
+        "group = \"bone\"\nknown = { thickness = \"t\" }",
+        "data.known.thickness: unknown key; did you mean `bone_thickness`?",
+    );
+    columns(
+        "group = \"bone\"\nknown = { bone_thickness = 3e-3 }",
+        "data.known.bone_thickness: is 0.003; it must be the name of a column of the file of velocities",
+    );
 }
 
 #[test]
@@ -282,6 +345,16 @@ fn single_velocities_far_from_the_others_are_warned_of_with_their_line() {
           in other units, or a slip of the decimal point?"
         ]
     );
+}
+
+#[test]
+fn unusual_known_values_are_told_of_one_group() {
+    let csv =
+        "bone,t,velocity\na,3e-3,3900\na,3e-3,3950\nb,1e-3,3900\nc,40e-3,3910\nd,50e-3,3910\n";
+    let job = "group = \"bone\"\nknown = { bone_thickness = \"t\" }";
+    let expected =
+        "data.known.bone_thickness: that of the group \"c\" is 0.04 m; usual is 0.0002 to 0.03 m";
+    assert_eq!(warnings(csv, job), [expected]);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, Omitted, Prior,
     Range, Search,
 };
+use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::violations::Violations;
@@ -115,10 +116,13 @@ fn data_to_message(data: &Data) -> v1::Data {
             v1::Data { velocities: velocities.clone(), subjects: numbers(subjects), ..message }
         }
         Measurements::Groups(groups) => {
-            let group = |Group { name, velocities, subjects }: &Group| v1::VelocityGroup {
+            let group = |Group { name, velocities, subjects, known }: &Group| v1::VelocityGroup {
                 name: name.clone(),
                 velocities: velocities.clone(),
                 subjects: numbers(subjects),
+                bone_thickness: known.get(Parameter::BoneThickness),
+                bone_quality_factor: known.get(Parameter::BoneQualityFactor),
+                coupling_sound_speed: known.get(Parameter::CouplingSoundSpeed),
             };
             v1::Data { groups: groups.iter().map(group).collect(), ..message }
         }
@@ -162,6 +166,11 @@ fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measu
                 name: group.name.clone(),
                 velocities: group.velocities.clone(),
                 subjects: numbers(&group.subjects),
+                known: KnownQuantities::new([
+                    group.bone_thickness,
+                    group.bone_quality_factor,
+                    group.coupling_sound_speed,
+                ]),
             };
             Some(Measurements::Groups(groups.iter().map(group).collect()))
         }

@@ -90,7 +90,7 @@ pub(crate) fn posterior(
         .filter(|row| !row.role.posterior)
         .filter_map(|row| Some((row.point, feasible_moments(row)?)));
     let likelihood = likelihood(specification, set);
-    let mut search = PosteriorSearch::new(specification, likelihood, known);
+    let mut search = PosteriorSearch::new(&specification.of_set(set), likelihood, known);
     for row in rows().filter(|row| row.role.posterior) {
         search.tell(feasible_moments(row));
     }

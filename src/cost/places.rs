@@ -12,9 +12,11 @@ const RATIO_STEPS: usize = 64;
 /// Returns the start, and for an identification at most `count` admissible points of the box: first the corner whose bones are
 /// probably slowest to compute, then a sequence that fills the box evenly.
 pub(super) fn points(specification: &JobSpecification, count: usize) -> Vec<Point> {
-    let ranges = specification.parameters;
+    // Where groups have setups of their own, the first that is searched stands for all.
+    let set = specification.data.as_ref().and_then(|data| data.searched_sets().next()).unwrap_or(0);
+    let ranges = specification.ranges_of(set);
     let free = specification.free().count();
-    let mut points = vec![specification.start()];
+    let mut points = vec![specification.start_of(set)];
     if specification.kind == JobKind::Propagation || count == 0 {
         return points;
     }

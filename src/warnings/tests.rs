@@ -94,10 +94,8 @@ fn a_coefficient_of_variation_out_of_reach_is_told() {
 
 #[test]
 fn groups_are_named_and_counted() {
-    let group = |name: String, mean: f64| Group {
-        name,
-        velocities: (0..20).map(|i| mean * (1.0 + 0.01 * f64::from(i % 5))).collect(),
-        subjects: None,
+    let group = |name: String, mean: f64| {
+        Group::new(name, (0..20).map(|i| mean * (1.0 + 0.01 * f64::from(i % 5))).collect())
     };
     let mut groups = vec![group("fine".to_owned(), 3900.0)];
     groups.extend((0..7).map(|i| group(format!("P{i}"), 5500.0)));

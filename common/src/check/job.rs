@@ -11,6 +11,7 @@ use crate::parameters::Parameter;
 use crate::violations::Violations;
 
 use super::data::{data_from, no_data};
+use super::known_quantities::known_quantities;
 use super::posterior::posterior_of_job;
 use super::priors::priors;
 use super::range::range;
@@ -48,6 +49,7 @@ pub fn job_from(
         range(parameter, specification.range(parameter), violations);
     }
     setup_parameters(specification, violations);
+    known_quantities(specification, origin, violations);
     admissible_start(specification, violations);
     something_to_search(specification, violations);
     random_setup(specification, violations);

@@ -14,11 +14,7 @@ pub(crate) fn jobs() -> [(&'static str, JobSpecification); 4] {
     let plain = fake::identification(300, 60, 7);
     let search = Search { sensitivities: true, ..plain.search };
     let measured = Data::from_velocities(velocities(3900.0, 360.0, 40));
-    let group = |name: &str, mean, width| Group {
-        name: name.to_owned(),
-        velocities: velocities(mean, width, 25),
-        subjects: None,
-    };
+    let group = |name: &str, mean, width| Group::new(name.to_owned(), velocities(mean, width, 25));
     let groups = vec![group("left", 3900.0, 360.0), group("right, \"distal\"", 3800.0, 420.0)];
     let mut priors = Search::default().priors;
     priors[0] = Some(Prior { value: 1650.0, weight: 1e-3 });

@@ -30,10 +30,8 @@ fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobS
     }
     // One in four has two groups, one in four has two starts, one in two has derivatives.
     if seed.is_multiple_of(4) {
-        let group = |name: &str, velocity: f64| Group {
-            name: name.to_owned(),
-            velocities: vec![0.97 * velocity, 1.03 * velocity],
-            subjects: None,
+        let group = |name: &str, velocity: f64| {
+            Group::new(name.to_owned(), vec![0.97 * velocity, 1.03 * velocity])
         };
         specification.data =
             Some(Data::from_groups(vec![group("left", 3900.0), group("right", 4000.0)]));

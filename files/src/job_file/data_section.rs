@@ -7,7 +7,9 @@ use osteon_common::data::numbered;
 use osteon_common::field_path::entry_path;
 use osteon_common::fields::{Key, WholeRange};
 use osteon_common::job::{Data, Group, JobKind, Measurements};
+use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::origin::Origin;
+use osteon_common::parameters::Parameter;
 
 use crate::document::{Node, Value};
 use crate::reader::{Reader, Table};
@@ -16,7 +18,7 @@ use crate::velocities::{self, CsvError, Measured, NamedColumns};
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 
 /// The keys of `[data]`.
-pub(super) const KEYS: [Key; 9] = [
+pub(super) const KEYS: [Key; 10] = [
     Key {
         name: "velocities",
         meaning: "for `identify`: path of a CSV file, relative to the job file's directory, with a \
@@ -35,9 +37,16 @@ pub(super) const KEYS: [Key; 9] = [
                   least two subjects, in each group",
     },
     Key {
+        name: "known",
+        meaning: "quantities of the setup that are known of each group: the names of the CSV columns that \
+                  hold their values (SI units, the same in all rows of a group), for any of \
+                  `bone_thickness`, `bone_quality_factor`, `coupling_sound_speed`; requires `group`, see \
+                  [below](#groups-of-velocities)",
+    },
+    Key {
         name: "groups",
         meaning: "instead of a file: a table with a list of velocities for each group name, or with a \
-                  table of `velocities` and `subjects`",
+                  table of `velocities`, `subjects`, and quantities that are `known` of the group",
     },
     Key {
         name: "subjects",
@@ -137,7 +146,7 @@ fn given(
 /// Records keys that say nothing about data of this form.
 fn unneeded(reader: &mut Reader, table: &Table<'_>, has_moments: bool) {
     let has_velocities = table.has("velocities");
-    for key in ["group", "subject"].into_iter().filter(|key| table.has(key)) {
+    for key in ["group", "subject", "known"].into_iter().filter(|key| table.has(key)) {
         if !has_velocities {
             let message =
                 "names a column of the file of velocities, and there is none; give `velocities`";
@@ -183,15 +192,19 @@ fn group(reader: &mut Reader, groups: &str, name: &str, node: &Node) -> Option<G
     match &node.value {
         Value::List(elements) => Some(Group::new(name, reader.numbers(&path, elements)?)),
         Value::Table(_) => {
-            let table = reader.table_at(node, path, &["velocities", "subjects"]);
+            let mut keys = vec!["velocities", "subjects"];
+            keys.extend(Parameter::OF_SETUP.map(Parameter::name));
+            let table = reader.table_at(node, path, &keys);
             let expected = "a list of velocities (m/s)";
             if !table.has("velocities") {
                 reader.missing(&table, "velocities", expected);
             }
             let elements = reader.list(&table, "velocities", expected);
             let subjects = subjects(reader, &table);
+            let known = Parameter::OF_SETUP.map(|one| reader.number(&table, one.name()));
+            let known = KnownQuantities::new(known);
             let velocities = reader.numbers(&table.path("velocities"), elements?)?;
-            Some(Group { name: name.to_owned(), velocities, subjects: subjects? })
+            Some(Group { name: name.to_owned(), velocities, subjects: subjects?, known })
         }
         other => {
             let expected = "a list of velocities (m/s), or a table with velocities and subjects";
@@ -220,11 +233,18 @@ fn velocities(
 ) -> Option<Measurements> {
     let path = table.path("velocities");
     let [group, subject] = ["group", "subject"].map(|key| column(reader, table, key));
+    let known = known_columns(reader, table);
     match &table.get("velocities")?.value {
         Value::List(_) if table.has("group") => {
             let message = "names a column of a file, but velocities is a list; \
                            give the name of a CSV file, or [data.groups]";
             reader.violations.add(table.path("group"), message);
+            None
+        }
+        Value::List(_) if table.has("known") => {
+            let message = "names columns of a file, but velocities is a list; \
+                           give the name of a CSV file, or the values in [data.groups]";
+            reader.violations.add(table.path("known"), message);
             None
         }
         Value::List(_) if table.has("subject") => {
@@ -244,8 +264,14 @@ fn velocities(
             reader.violations.add(table.path("subjects"), message);
             None
         }
+        Value::Text(_) if table.has("known") && !table.has("group") => {
+            let message = "has a value for each group, and there are no groups; name their column: group = \
+                           \"…\"";
+            reader.lacks(&table.path("known"), &[table.path("group")], message);
+            None
+        }
         Value::Text(_) if kind == JobKind::Propagation => None,
-        Value::Text(name) => match from_file(name, NamedColumns { group, subject }) {
+        Value::Text(name) => match from_file(name, NamedColumns { group, subject, known }) {
             Ok(data) => Some(data),
             Err(problems) => {
                 for problem in problems {
@@ -263,6 +289,16 @@ fn velocities(
             None
         }
     }
+}
+
+/// Returns the columns of quantities that are known of each group, in the order of
+/// [`Parameter::OF_SETUP`].
+fn known_columns<'a>(
+    reader: &mut Reader,
+    table: &Table<'a>,
+) -> [Option<&'a str>; Parameter::OF_SETUP.len()] {
+    let known = reader.table(table, "known", &Parameter::OF_SETUP.map(Parameter::name));
+    Parameter::OF_SETUP.map(|parameter| column(reader, &known, parameter.name()))
 }
 
 /// Returns the name of a column.

@@ -103,13 +103,32 @@ fn data() -> Json {
         (Key { name: "subjects", meaning: "subject of each velocity, a whole number" }, subjects()),
     ];
     let of_group = of_group.map(|(key, schema)| (key.name.to_owned(), described(schema, key)));
-    let mut group = object(of_group.into_iter().collect::<Map<_, _>>().into());
+    let known = |schema: &dyn Fn(Parameter) -> Json| {
+        Parameter::OF_SETUP.map(|parameter| (parameter.name().to_owned(), schema(parameter)))
+    };
+    let value = |parameter: Parameter| {
+        let unit = match parameter.unit() {
+            "" => String::new(),
+            unit => format!(", {unit}"),
+        };
+        let mut value = above_zero();
+        value["description"] = format!("value that is known of the group{unit}").into();
+        value
+    };
+    let properties = of_group.into_iter().chain(known(&value));
+    let mut group = object(properties.collect::<Map<_, _>>().into());
+    let column = |_| {
+        let meaning = "name of the CSV column that holds the value for each group";
+        described(name(), Key { name: "", meaning })
+    };
+    let columns = object(known(&column).into_iter().collect::<Map<_, _>>().into());
     group["required"] = json!(["velocities"]);
     let group = json!({ "anyOf": [list(), group] });
     let types = [
         json!({ "anyOf": [name(), list()] }),
         name(),
         name(),
+        columns,
         json!({ "type": "object", "additionalProperties": group }),
         subjects(),
         above_zero(),

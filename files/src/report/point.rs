@@ -19,13 +19,13 @@ pub struct MeanModel {
     pub transverse_young_modulus: Option<f64>,
     /// Transverse Poisson ratio.
     pub transverse_poisson_ratio: Option<f64>,
-    /// Thickness of the bone, m; only if it was searched.
+    /// Thickness of the bone, m; only if it was searched, or is known of the group.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bone_thickness: Option<f64>,
-    /// Quality factor of the bone; only if it was searched.
+    /// Quality factor of the bone; only if it was searched, or is known of the group.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bone_quality_factor: Option<f64>,
-    /// Speed of sound of the coupling layer, m/s; only if it was searched.
+    /// Speed of sound of the coupling layer, m/s; only if it was searched, or is known of the group.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupling_sound_speed: Option<f64>,
 }

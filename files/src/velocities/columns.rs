@@ -1,6 +1,7 @@
 //! The columns of a CSV file of velocities, and its rows.
 
 use osteon_common::check::VELOCITY;
+use osteon_common::parameters::Parameter;
 
 use super::problem::{COLUMN, Problem, listed, shortened};
 
@@ -15,14 +16,17 @@ pub(crate) struct NamedColumns<'a> {
     pub(crate) group: Option<&'a str>,
     /// The column of the subject of each velocity.
     pub(crate) subject: Option<&'a str>,
+    /// The columns of quantities that are known of each group, for each of [`Parameter::OF_SETUP`].
+    pub(crate) known: [Option<&'a str>; Parameter::OF_SETUP.len()],
 }
 
-/// Positions of velocity, group and subject in each row.
+/// Positions of velocity, group, subject and known quantities in each row.
 pub(super) struct Columns {
     count: usize,
     velocity: usize,
     group: Option<NamedColumn>,
     subject: Option<NamedColumn>,
+    known: [Option<NamedColumn>; Parameter::OF_SETUP.len()],
     /// A column that seems to name subjects, if none is named.
     like_subjects: Option<NamedColumn>,
 }
@@ -43,6 +47,8 @@ pub(super) struct Row {
     pub(super) subject: Option<String>,
     /// Velocity, m/s.
     pub(super) velocity: f64,
+    /// Quantities that are known of the group.
+    pub(super) known: [Option<f64>; Parameter::OF_SETUP.len()],
 }
 
 impl Columns {
@@ -71,7 +77,11 @@ impl Columns {
         // A column that is there twice is none.
         let like_subjects = column(like.map(String::as_str), "subject").unwrap_or(None);
         let velocity = place_of(COLUMN, &names)?;
-        Ok(Self { count: names.len(), velocity, group, subject, like_subjects })
+        let mut known = [const { None }; Parameter::OF_SETUP.len()];
+        for (found, name) in known.iter_mut().zip(named.known) {
+            *found = column(name, "value")?;
+        }
+        Ok(Self { count: names.len(), velocity, group, subject, known, like_subjects })
     }
 
     /// Returns the fields of a line that are used.
@@ -90,7 +100,17 @@ impl Columns {
             (None, Some(column)) => Some(std::mem::take(&mut fields[column.place])),
             (None, None) => None,
         };
-        Ok(Row { group, subject, velocity })
+        let mut known = [None; Parameter::OF_SETUP.len()];
+        for (value, column) in known.iter_mut().zip(&self.known) {
+            *value = column.as_ref().map(|column| column.number_in(&fields)).transpose()?;
+        }
+        Ok(Row { group, subject, velocity, known })
+    }
+
+    /// Returns the name of the column of a known quantity, by its position.
+    pub(super) fn known(&self, quantity: usize) -> &str {
+        let column = self.known.get(quantity).and_then(Option::as_ref);
+        column.map_or("", |column| column.name.as_str())
     }
 
     /// Returns the name of a column that seems to name subjects, if none is named.
@@ -104,6 +124,18 @@ impl NamedColumn {
         match fields[self.place].as_str() {
             "" => Err(Problem::NoName { column: shortened(&self.name), named: self.named }),
             name => Ok(name.to_owned()),
+        }
+    }
+}
+
+impl NamedColumn {
+    fn number_in(&self, fields: &[String]) -> Result<f64, Problem> {
+        let text = fields[self.place].as_str();
+        let column = || shortened(&self.name);
+        match text.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ if text.is_empty() => Err(Problem::NoKnownValue { column: column() }),
+            _ => Err(Problem::NotAKnownValue { column: column(), found: shortened(text) }),
         }
     }
 }

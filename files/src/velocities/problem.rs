@@ -35,6 +35,17 @@ pub(super) enum Problem {
     RepeatedColumn { column: String },
     #[error("{column} is empty; it must name the {named} of the velocity")]
     NoName { column: String, named: &'static str },
+    #[error("{column} is empty; it must be a number (SI units), the same in all rows of a group")]
+    NoKnownValue { column: String },
+    #[error(
+        "{column} is {found:?}; it must be a number (SI units), the same in all rows of a group"
+    )]
+    NotAKnownValue { column: String, found: String },
+    #[error(
+        "{column} is {found:?}, and {first:?} in line {line}; all rows of the group {group:?} must have the \
+         same value"
+    )]
+    OtherKnownValue { column: String, found: f64, first: f64, line: u32, group: String },
     #[error(
         "no group of the column `{column}` has two velocities that differ; a coefficient of variation \
          needs at least two different ones"

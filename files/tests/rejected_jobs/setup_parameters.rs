@@ -33,6 +33,38 @@ fn setup_parameters() {
     check("rejected_setup_parameters", JobKind::Identification, &edits);
 }
 
+/// `known` is of the group `b`; `a` has a thickness of 3 mm.
+#[test]
+fn known_quantities_of_groups() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    let group = "groups.a = { velocities = [3900.0, 4000.0], bone_thickness = 3e-3 }";
+    let with =
+        |known: &str| format!("{group}\ngroups.b = {{ velocities = [3900.0, 4000.0]{known} }}");
+    let edits = [
+        with(""),
+        with(", coupling_sound_speed = 1480.0"),
+        with(", bone_thickness = 3"),
+        with(", bone_thickness = 0.0"),
+        with(", bone_thickness = \"3e-3\""),
+        // Extreme realizations of thinner bones have no thickness.
+        with(", bone_thickness = 0.3e-3"),
+        with(", probe_tilt = 0.01"),
+        format!("{group}\nknown = {{ bone_thickness = \"t\" }}"),
+        format!("{given}\nknown = {{ bone_thickness = \"t\" }}"),
+    ];
+    let edits: Vec<(&str, &str)> = edits.iter().map(|to| (given, to.as_str())).collect();
+    check("rejected_known_quantities", JobKind::Identification, &edits);
+    let searched = edited(given, group)
+        .replace(FIRST, &format!("[parameters.bone_thickness]\nbounds = [2e-3, 5e-3]\n\n{FIRST}"));
+    let refused = super::refusal(&searched, JobKind::Identification);
+    let expected = "data.groups.\"a\".bone_thickness: is known of each group, and \
+                    parameters.bone_thickness is searched; leave one of them out";
+    assert!(
+        refused.contains(expected) || refused.contains(&expected.replace('"', "")),
+        "{refused}"
+    );
+}
+
 #[test]
 fn a_quantity_of_the_setup_starts_at_its_value_there() {
     let (from, to) = with("bone_thickness", "bounds = [2e-3, 5e-3]");

@@ -64,7 +64,7 @@ impl DatasetSearch {
     pub(super) fn new(specification: &JobSpecification, set: usize) -> Self {
         let given = specification.data.as_ref();
         let data = given.map_or(Moments::UNKNOWN, |given| given.moments(set));
-        let space = space_of_start(specification, 0);
+        let space = space_of_start(specification, set, 0);
         let weighted = given.filter(|_| specification.objective == Objective::ChiSquare);
         let weights = weighted.and_then(|given| MomentWeights::of_data(given, set));
         let measured = measured(specification, set);
@@ -271,7 +271,7 @@ impl DatasetSearch {
         }
         self.start += 1;
         if u64::from(self.start) < specification.search.starts {
-            self.space = space_of_start(specification, self.start);
+            self.space = space_of_start(specification, self.set as usize, self.start);
             let measured = measured(specification, self.set as usize);
             let method =
                 MethodState::new(specification, self.data, measured, self.weights, self.space);
@@ -291,9 +291,11 @@ impl DatasetSearch {
         if specification.posterior.is_none() {
             return self.end(specification);
         }
-        let likelihood = likelihood(specification, self.set as usize);
+        let set = self.set as usize;
+        let likelihood = likelihood(specification, set);
         let known = std::mem::take(&mut self.known);
-        let posterior = PosteriorSearch::new(specification, likelihood, known.into_iter());
+        let posterior =
+            PosteriorSearch::new(&specification.of_set(set), likelihood, known.into_iter());
         self.posterior = Some(Box::new(posterior));
     }
 
@@ -349,10 +351,10 @@ fn method_of_start(
     if is_random { method.near_the_data() } else { method }
 }
 
-/// Returns the box for one of a job's searches. Its start is that of the parameters, or a random
-/// point, which is the same for every set of data.
-fn space_of_start(specification: &JobSpecification, start: u32) -> SearchBox {
-    let space = SearchBox::new(specification.parameters);
+/// Returns the box for one of the searches for a set of data. Its start is that of the parameters, or a
+/// random point, which is the same for every set.
+fn space_of_start(specification: &JobSpecification, set: usize, start: u32) -> SearchBox {
+    let space = SearchBox::new(specification.ranges_of(set));
     let start = specification.search.first_start + u64::from(start);
     if start == 0 {
         return space;

@@ -4,6 +4,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{
     PosteriorPrior, PosteriorSettings, PriorDistribution, Sampling, SearchMethod,
 };
+use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::extended;
 use osteon_common::random_quantities::{RandomDistribution, Scatter};
@@ -36,19 +37,50 @@ fn data() -> impl Strategy<Value = Data> {
             velocities.insert(0, 1999.0);
             Data::from_velocities(velocities)
         }),
-        proptest::collection::vec("[a-zβ ]{1,9}", 1..5).prop_map(|names| {
-            let group = |(i, name): (usize, &String)| Group {
-                name: format!("{name}{i}"),
-                velocities: vec![1999.0, 2000.0 + i as f64],
-                subjects: None,
-            };
-            Data::from_groups(names.iter().enumerate().map(group).collect())
-        }),
+        (proptest::collection::vec("[a-zβ ]{1,9}", 1..5), any::<[bool; 3]>()).prop_map(
+            |(names, known)| {
+                let group = |(i, name): (usize, &String)| Group {
+                    name: format!("{name}{i}"),
+                    velocities: vec![1999.0, 2000.0 + i as f64],
+                    subjects: None,
+                    known: known_quantities(i, known),
+                };
+                Data::from_groups(names.iter().enumerate().map(group).collect())
+            }
+        ),
         (2000.0..6000.0, 0.002..0.4).prop_map(|(mean, coefficient_of_variation)| {
             Data::from_moments(mean, coefficient_of_variation)
         }),
     ];
     (exact, noise).prop_map(|(data, noise)| with_noise(data, noise))
+}
+
+/// Returns values for those quantities that are known, other ones for each group.
+fn known_quantities(group: usize, known: [bool; 3]) -> KnownQuantities {
+    let (usual, mut values) = ([4e-3, 20.0, 1500.0], [None; 3]);
+    for ((value, usual), known) in values.iter_mut().zip(usual).zip(known) {
+        *value = known.then_some(usual * (1.0 + 0.01 * group as f64));
+    }
+    KnownQuantities::new(values)
+}
+
+/// Keeps only those known quantities that are not searched, and that the setup has.
+fn knowing_what_is_not_searched(
+    mut data: Data,
+    parameters: &[Range; PARAMETERS],
+    setup: &Setup,
+) -> Data {
+    if let Measurements::Groups(groups) = &mut data.measurements {
+        for group in groups {
+            let kept = |parameter: Parameter| {
+                let is_fixed = matches!(parameters[parameter as usize], Range::Fixed(_));
+                let has = parameter.of_setup().is_some_and(|one| one.of(setup).is_some());
+                group.known.get(parameter).filter(|_| is_fixed && has)
+            };
+            group.known = KnownQuantities::new(Parameter::OF_SETUP.map(kept));
+        }
+    }
+    data
 }
 
 /// Adds what may be known of the noise, by chance.
@@ -173,6 +205,7 @@ prop_compose! {
         let parameters = searched(parameters, &setup, chosen);
         let needs_noise = posterior.is_some() || method == SearchMethod::Posterior;
         let data = data.map(|data| if needs_noise { counted(data) } else { data });
+        let data = data.map(|data| knowing_what_is_not_searched(data, &parameters, &setup));
         let posterior = posterior.filter(|_| data.is_some()).map(|mut posterior| {
             for (prior, range) in posterior.priors.iter_mut().zip(&parameters) {
                 if matches!(range, Range::Fixed(_)) {

@@ -1,5 +1,8 @@
 //! Groups of data, several starts, and the derivatives at the end.
 
+use osteon_common::job::{Measurements, PosteriorSettings};
+use osteon_common::known_quantities::KnownQuantities;
+
 use super::*;
 
 #[test]
@@ -106,13 +109,43 @@ fn priors_choose_among_the_points_that_match() {
 
 /// Groups with these mean velocities; all have the dispersion of the start.
 fn grouped(means: &[f64]) -> JobSpecification {
-    let group = |(k, mean): (usize, &f64)| Group {
-        name: format!("group {k}"),
-        velocities: vec![0.97 * mean, 1.03 * mean],
-        subjects: None,
-    };
+    let group =
+        |(k, mean): (usize, &f64)| Group::new(format!("group {k}"), vec![0.97 * mean, 1.03 * mean]);
     let groups = means.iter().enumerate().map(group).collect();
     JobSpecification { data: Some(Data::from_groups(groups)), ..by_newton(60) }
+}
+
+/// Every point of a group has the values that are known of it: of the searches from all starts, of the
+/// derivatives and of the posterior. The path is that of a job without them.
+#[test]
+fn what_is_known_of_a_group_is_in_all_its_points() {
+    let means = [3800.0, 3900.0];
+    let mut unknown = grouped(&means);
+    unknown.search.starts = 2;
+    let posterior = PosteriorSettings { max_evaluations: 50, ..PosteriorSettings::default() };
+    unknown.posterior = Some(posterior);
+    let values = |set: usize| [Some(3e-3 + 1e-3 * set as f64), None, Some(1480.0)];
+    let mut known = unknown.clone();
+    if let Some(Measurements::Groups(groups)) =
+        known.data.as_mut().map(|data| &mut data.measurements)
+    {
+        for (set, group) in groups.iter_mut().enumerate() {
+            group.known = KnownQuantities::new(values(set));
+        }
+    }
+    assert!(known.check().is_empty(), "{:?}", known.check());
+    let given: Vec<Parameter> = known.parameters_given().skip(7).collect();
+    assert_eq!(given, [Parameter::BoneThickness, Parameter::CouplingSoundSpeed]);
+    let (with, _) = run(&known);
+    let (without, _) = run(&unknown);
+    assert_eq!(with.history().len(), without.history().len());
+    assert!(with.history().iter().any(|row| row.role.posterior));
+    assert!(with.history().iter().any(|row| row.role.start == 1));
+    for (row, other) in with.history().iter().zip(without.history()) {
+        let [thickness, _, speed] = values(row.role.group as usize);
+        assert_eq!(row.point.0[7..], [thickness.unwrap(), 0.0, speed.unwrap()]);
+        assert_eq!(row.point.0[..7], other.point.0[..7]);
+    }
 }
 
 #[test]
@@ -194,11 +227,8 @@ fn more_starts_go_on_after_those_of_another_job() {
 
 /// A job with these groups, some of which have nothing to match.
 fn job_of(groups: &[(&str, &[f64])]) -> JobSpecification {
-    let group = |(name, velocities): &(&str, &[f64])| Group {
-        name: (*name).to_owned(),
-        velocities: velocities.to_vec(),
-        subjects: None,
-    };
+    let group =
+        |(name, velocities): &(&str, &[f64])| Group::new((*name).to_owned(), velocities.to_vec());
     let data = Some(Data::from_groups(groups.iter().map(group).collect()));
     JobSpecification { data, ..specification(400) }
 }
