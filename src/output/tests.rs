@@ -11,6 +11,7 @@ use osteon_solver::{Failure, FirstSignal, GuidedWave, PassSummary, Sampled};
 use super::*;
 use crate::sample_result::{identification, propagation};
 
+mod cost;
 mod jobs;
 mod posterior;
 mod simulation;

@@ -1,4 +1,5 @@
 use osteon_common::job::{Data, Group, MonteCarlo, Objective, Search};
+use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::random_quantities::RandomQuantities;
 
 use super::*;
@@ -124,4 +125,21 @@ fn what_is_not_known_is_not_told() {
     assert_eq!(out_of_reach(&job), [""; 0]);
     job.setup.probe.receivers.first_x1 = 1.5;
     assert_eq!(out_of_reach(&job), [""; 0], "too many pairs");
+}
+
+/// Data out of reach of the job's plate of 4 mm can be within reach of a group's own, and the other way
+/// round.
+#[test]
+fn a_group_is_compared_with_its_own_setup() {
+    let velocities: Vec<f64> =
+        (0..20).map(|i| 3400.0 * (1.0 + 0.02 * f64::from(i % 5 - 2))).collect();
+    let lines = |thickness: Option<f64>| {
+        let known = KnownQuantities::new([thickness, None, None]);
+        let slow = Group { known, ..Group::new("slow", velocities.clone()) };
+        out_of_reach(&job(Data::from_groups(vec![slow]), FIXED)).join("\n")
+    };
+    let (of_job, same, thin) = (lines(None), lines(Some(4e-3)), lines(Some(0.5e-3)));
+    assert!(of_job.starts_with("the mean of the group \"slow\" is 3400, below"), "{of_job}");
+    assert_eq!(of_job, same);
+    assert_eq!(thin, "", "a thin plate is slower");
 }

@@ -96,7 +96,7 @@ fn measured(cost: &JobCost) -> String {
         None => row(name, None, 0, 0),
     };
     let mut rows = vec![header, of(cost.start.as_ref(), "at the start")];
-    if cost.places.len() + cost.unmeasured > 0 {
+    if !cost.places.is_empty() {
         let sum = |count: fn(&PlaceCost) -> usize| cost.places.iter().map(count).sum();
         let (measured, failed) = (sum(|place| place.measured), sum(|place| place.failed));
         let median = format!("median of {} points of the box", cost.places.len());
@@ -116,9 +116,9 @@ fn worst(specification: &JobSpecification, cost: &JobCost) -> String {
         sentences.push(format!("the worst has {}", at.collect::<Vec<_>>().join(", ")));
     }
     if cost.unmeasured > 0 {
-        let count = counted(cost.unmeasured as u64, "further point");
+        let count = counted(cost.unmeasured as u64, "point");
         let limit = glued(&span(cost.limit_s));
-        sentences.push(format!("{count} could not be measured within {limit}"));
+        sentences.push(format!("{count} of the box could not be measured within {limit}"));
     }
     sentences.join("\n")
 }
