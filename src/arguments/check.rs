@@ -7,10 +7,10 @@ use clap::Args;
 /// Arguments of `check`.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArguments {
-    /// Job file (TOML or JSON). It is checked as for `identify` if it has [data], otherwise as for
+    /// Job file (TOML or JSON). It is checked as for `identify` if it has data, otherwise as for
     /// `propagate`
     pub(crate) job: PathBuf,
-    /// Check the job as for `propagate`, even if it has [data]
+    /// Check the job as for `propagate`, even if it has data
     #[arg(long)]
     pub(crate) propagate: bool,
     /// Print the estimate as JSON
