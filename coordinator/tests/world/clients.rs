@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use osteon_common::job::{Data, Group, JobSpecification, Search, SearchMethod};
+use osteon_common::known_quantities::KnownQuantities;
 use osteon_coordinator::core::ids::JobId;
 
 use crate::fake;
@@ -28,13 +29,16 @@ fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobS
         let by = Search::by(SearchMethod::Newton);
         specification.search = Search { max_evaluations: evaluations, ..by };
     }
-    // One in four has two groups, one in four has two starts, one in two has derivatives.
+    // One in four has two groups, one in eight with thicknesses of their own; one in four has two starts,
+    // one in two has derivatives.
     if seed.is_multiple_of(4) {
-        let group = |name: &str, velocity: f64| {
-            Group::new(name.to_owned(), vec![0.97 * velocity, 1.03 * velocity])
+        let group = |name: &str, velocity: f64, thickness: f64| {
+            let known = Some(thickness).filter(|_| seed.is_multiple_of(8));
+            let known = KnownQuantities::new([known, None, None]);
+            Group { known, ..Group::new(name, vec![0.97 * velocity, 1.03 * velocity]) }
         };
-        specification.data =
-            Some(Data::from_groups(vec![group("left", 3900.0), group("right", 4000.0)]));
+        let groups = vec![group("left", 3900.0, 3e-3), group("right", 4000.0, 5e-3)];
+        specification.data = Some(Data::from_groups(groups));
     }
     specification.search.starts = 1 + u64::from(seed % 4 == 1);
     specification.search.sensitivities = !seed.is_multiple_of(3);
