@@ -60,7 +60,7 @@ const NOISE_FACTOR: f64 = 4.6;
 const WORST_NOISE_FACTOR: f64 = 0.75;
 /// Rate at which noise grows from where it is looked at to the pick, relative to the damping, where a
 /// layer is attenuated: what the sums leave out is then larger compared with the arrival.
-const NOISE_GROWTH: f64 = 0.5;
+const NOISE_GROWTH: f64 = 0.9;
 
 /// Tables of one speed bin, shared by all bones.
 #[derive(Debug)]
