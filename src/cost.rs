@@ -1,4 +1,4 @@
-//! What a job will cost on this machine, estimated before it is run.
+//! Estimates how long a job will take on this machine, before it is run.
 //!
 //! A few realizations are computed at the start and at points all over the box. Their times never
 //! reach a job or a result.

@@ -5,8 +5,8 @@
 //! made finer, as it is at once where the first arrival is small compared with later waves. If the pick
 //! is unreliable (late, weak, off the line of the others, or missing), the bone is computed again with
 //! a thorough sampling, whose band is widened if it finds nothing or its estimated error is large. So it
-//! is if the sampling's part of the error is large; if it still is, the last passes are finer and leave
-//! nothing out.
+//! is if the sampling's part of the error is large, or the whole error remains large after all bands; if
+//! the sampling's part is still large, the last passes are finer and leave nothing out.
 //! The results of two passes are blended with a weight from 0 (the first pass is reliable) to 1
 //! (the second replaces it). The tables are made for a geometric grid of speeds, whose intervals
 //! are called speed bins; near the edge of a bin the results of both neighbours are blended, too.

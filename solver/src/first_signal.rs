@@ -1,4 +1,4 @@
-//! What the first signal tells besides its velocity.
+//! Observables of the first signal besides its velocity: other extremum, decay, frequency.
 
 use std::f64::consts::LN_10;
 

@@ -1,4 +1,4 @@
-//! What a file is for, before it is read as such.
+//! Tells case files from job files by their sections, before they are read.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use super::BOUND;
 use crate::document::{self, Value};
 use crate::file_error::{self, FileError};
 
-/// What a file describes, by the sections that it has.
+/// The kind of a file, as its sections show it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FilePurpose {
     /// A job: an identification if it has `[data]`, otherwise a propagation.

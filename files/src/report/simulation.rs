@@ -21,7 +21,7 @@ pub struct Simulation {
     pub detail: Option<String>,
     /// The receivers, in their order.
     pub receivers: Vec<Receiver>,
-    /// What else the first signal tells; null where there is no velocity.
+    /// Further observables of the first signal; null where there is no velocity.
     pub first_signal: Option<FirstSignalReport>,
     /// The fundamental guided waves of the bone.
     pub guided_waves: GuidedWavesReport,

@@ -108,14 +108,14 @@ const SHEAR: usize = 1;
 /// p3, that of A0.
 const FLEXURAL: usize = 2;
 
-/// Of which planes a solid is its own image.
+/// The planes in which a solid is its own mirror image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Symmetry {
-    /// That of propagation, across x2.
+    /// The plane of propagation, across x2.
     propagation: bool,
-    /// That of the plate, across x3.
+    /// The plane of the plate, across x3.
     plate: bool,
-    /// That across x1: with the image in a point, half a turn about x1.
+    /// The plane across x1: with the image in a point, half a turn about x1.
     cross: bool,
 }
 
