@@ -295,7 +295,7 @@ impl WaveSampling {
         let bands = relative_bands(grade, refinement, thinness(setup));
         let unit = match grade {
             Grade::Quick => thinness(setup).min(1.4),
-            Grade::Plain => 3.0,
+            Grade::Plain => 1.6,
             Grade::Thorough => 1.5 * refinement.max(2.0),
             Grade::Full => f64::INFINITY,
         };

@@ -6,7 +6,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Revision of everything that influences a velocity's bits: ensemble, solver, picking. It must be
 /// incremented with every intended change of a result's bits.
-pub const NUMERICS_REVISION: u32 = 11;
+pub const NUMERICS_REVISION: u32 = 12;
 
 /// Revision of the keys of all results in JSON, and of the columns of the accompanying tables. It
 /// must be incremented if one is removed or renamed, or changes its meaning; it stays the same if a

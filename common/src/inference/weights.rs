@@ -67,6 +67,12 @@ impl MomentWeights {
         self.square(log_ratios(model, data))
     }
 
+    /// Returns the largest sum of squares of (ln v, ln Δ) for which χ² is surely at most `square`.
+    pub fn relative_squares(&self, square: f64) -> f64 {
+        let Self { mean, cross, variation } = self;
+        square / mean.mul_add(*mean, cross.mul_add(*cross, variation * variation))
+    }
+
     /// Returns the expectation of χ² if the differences have no other cause than independent errors
     /// with these standard deviations.
     pub fn of_errors(&self, [mean, variation]: [f64; 2]) -> f64 {
@@ -124,6 +130,17 @@ mod tests {
             assert!((weights.square(r) / expected - 1.0).abs() < 1e-12, "{r:?}");
         }
         assert_eq!(MomentWeights::of_covariance([[0.0, 0.0], [0.0, 1.0]]), None);
+    }
+
+    #[test]
+    fn relative_squares_bound_chi_square() {
+        let weights = MomentWeights::of_covariance(COVARIANCE).unwrap();
+        let radius = weights.relative_squares(0.25).sqrt();
+        let angles = (0..360).map(|degrees| f64::from(degrees).to_radians());
+        let squares =
+            angles.map(|angle| weights.square([radius * angle.cos(), radius * angle.sin()]));
+        let largest = squares.fold(0.0, f64::max);
+        assert!((0.1..=0.25).contains(&largest), "{largest}");
     }
 
     #[test]

@@ -19,6 +19,9 @@ use crate::search_box::{SearchBox, admissible};
 
 /// Step of the finite differences that measure derivatives, in edges of the box.
 const DIFFERENCE: f64 = 1e-4;
+/// χ² at which a further start ends once an earlier one has met the tolerance, and so is the answer:
+/// a tenth of a standard error of the data is enough for one more set of parameters that fits them.
+const FITTING: f64 = 1e-2;
 /// Maximum number of random points of the box that are tried for an admissible start.
 const START_TRIES: u64 = 64;
 
@@ -68,7 +71,8 @@ impl DatasetSearch {
         let weighted = given.filter(|_| specification.objective == Objective::ChiSquare);
         let weights = weighted.and_then(|given| MomentWeights::of_data(given, set));
         let measured = measured(specification, set);
-        let method = MethodState::new(specification, data, measured, weights, space);
+        let tolerance = specification.search.cost_tolerance;
+        let method = MethodState::new(specification, data, measured, weights, space, tolerance);
         let mut search = Self {
             // A job has at most a thousand sets.
             set: u32::try_from(set).unwrap_or(u32::MAX),
@@ -271,10 +275,12 @@ impl DatasetSearch {
         }
         self.start += 1;
         if u64::from(self.start) < specification.search.starts {
-            self.space = space_of_start(specification, self.set as usize, self.start);
-            let measured = measured(specification, self.set as usize);
-            let method =
-                MethodState::new(specification, self.data, measured, self.weights, self.space);
+            let set = self.set as usize;
+            self.space = space_of_start(specification, set, self.start);
+            let measured = measured(specification, set);
+            let (data, weights, space) = (self.data, self.weights, self.space);
+            let tolerance = self.tolerance(specification);
+            let method = MethodState::new(specification, data, measured, weights, space, tolerance);
             self.method = method_of_start(specification, self.start, method);
             return;
         }
@@ -284,6 +290,23 @@ impl DatasetSearch {
         if self.differences.is_empty() {
             self.begin_posterior(specification);
         }
+    }
+
+    /// Returns the cost at which the search from the current start ends.
+    fn tolerance(&self, specification: &JobSpecification) -> f64 {
+        let given = specification.search.cost_tolerance;
+        let is_answered =
+            self.best().and_then(|best| best.cost).is_some_and(|lowest| lowest <= given);
+        if !is_answered {
+            return given;
+        }
+        let of_data = || MomentWeights::of_data(specification.data.as_ref()?, self.set as usize);
+        let fitting = match specification.objective {
+            Objective::ChiSquare => Some(FITTING),
+            Objective::Moments => of_data().map(|weights| weights.relative_squares(FITTING)),
+            Objective::Likelihood => None,
+        };
+        fitting.map_or(given, |fitting| fitting.max(given))
     }
 
     /// Begins the posterior, if the job asks for one; otherwise ends the search.

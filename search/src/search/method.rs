@@ -25,21 +25,22 @@ pub(super) enum MethodState {
 impl MethodState {
     /// Creates the method that the specification names, starting at the start of the box, for a set
     /// of data with these moments and, where they are known, these velocities; the weights are those
-    /// of χ², if that is the cost.
+    /// of χ², if that is the cost. It ends at a cost of at most `cost_tolerance`.
     pub(super) fn new(
         specification: &JobSpecification,
         data: Moments,
         measured: Option<&[f64]>,
         weights: Option<MomentWeights>,
         space: SearchBox,
+        cost_tolerance: f64,
     ) -> Self {
         let search = specification.search;
-        let Search { max_evaluations, cost_tolerance, size_tolerance, initial_step, .. } = search;
+        let Search { max_evaluations, size_tolerance, initial_step, .. } = search;
         match search.method {
             SearchMethod::Simplex => {
                 let settings = simplex::Settings {
                     max_evaluations,
-                    costs: costs(specification, measured),
+                    costs: costs(specification, measured, cost_tolerance),
                     size_tolerance,
                     initial_step,
                 };
@@ -106,11 +107,11 @@ impl MethodState {
 
 /// Returns how costs compare. A likelihood has no target value. Its logarithm is an average over
 /// the data, so the difference that counts as equal is divided by their number.
-fn costs(specification: &JobSpecification, measured: Option<&[f64]>) -> Costs {
+fn costs(specification: &JobSpecification, measured: Option<&[f64]>, tolerance: f64) -> Costs {
     match (specification.objective, measured) {
         (Objective::Likelihood, Some(measured)) => {
             Costs::Logarithms { equal: EQUAL_LIKELIHOODS / measured.len() as f64 }
         }
-        _ => Costs::Squares { tolerance: specification.search.cost_tolerance },
+        _ => Costs::Squares { tolerance },
     }
 }

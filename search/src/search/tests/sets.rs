@@ -211,6 +211,41 @@ fn several_starts_give_several_answers() {
     assert_eq!(search.summary(), again.summary());
 }
 
+/// Once the first start is the answer, the others are only more sets of parameters that fit: they end
+/// where both moments are within a tenth of a standard error of the data.
+#[test]
+fn further_starts_end_within_a_tenth_of_a_standard_error() {
+    for objective in [Objective::Moments, Objective::ChiSquare] {
+        let last_costs = |count: Option<u64>| -> (Vec<f64>, u64) {
+            let mut specification = by_newton(60);
+            let measurements =
+                Measurements::Moments { mean: 3900.0, coefficient_of_variation: 0.03, count };
+            specification.data = Some(Data { measurements, repeatability: 0.0 });
+            specification.objective = objective;
+            specification.parameters[0] =
+                Range::Free { start: 1600.0, lower: 1500.0, upper: 2000.0 };
+            specification.search.starts = 6;
+            let (search, _) = run(&specification);
+            let last = |start| {
+                let mut rows = search.history().iter().rev();
+                rows.find(|row| row.role.start == start && row.role.varied.is_none()).unwrap()
+            };
+            ((0..6).map(|start| last(start).cost.unwrap()).collect(), search.evaluations())
+        };
+        let (costs, evaluations) = last_costs(Some(100));
+        assert!(costs[0] <= 1e-12, "{objective:?}: {costs:?}");
+        let limit = if objective == Objective::ChiSquare { 1e-2 } else { 1e-2 * 9e-6 };
+        assert!(costs[1..].iter().all(|&cost| cost <= limit), "{objective:?}: {costs:?}");
+        assert!(costs[1..].iter().any(|&cost| cost > 1e-12), "{objective:?}: {costs:?}");
+        // Without their number, nothing is known of the errors of the data.
+        if objective == Objective::Moments {
+            let (costs, more) = last_costs(None);
+            assert!(costs.iter().all(|&cost| cost <= 1e-12), "{costs:?}");
+            assert!(more > evaluations, "{more}, {evaluations}");
+        }
+    }
+}
+
 #[test]
 fn more_starts_go_on_after_those_of_another_job() {
     let started_at = |first_start, starts: u32| -> Vec<Point> {
