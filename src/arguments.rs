@@ -2,6 +2,7 @@
 
 mod check;
 mod operators;
+mod realizations;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -13,6 +14,7 @@ use crate::program;
 
 pub(crate) use check::CheckArguments;
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
+pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
@@ -36,6 +38,8 @@ pub(crate) enum Command {
     Check(CheckArguments),
     /// Draw one random realization of a job and print it as a case file
     Draw(DrawArguments),
+    /// Compute all observables of a job's realizations: velocities, decay, frequency
+    Observe(ObserveArguments),
     /// Run a coordinator: accept jobs from clients and distribute them to workers, until interrupted
     Coordinator(CoordinatorArguments),
     /// Run a worker: compute realizations for a coordinator, until interrupted
@@ -124,22 +128,6 @@ pub(crate) struct SimulateArguments {
     /// Time step of the traces (seconds)
     #[arg(long, value_name = "S", default_value = "1e-8", value_parser = positive)]
     pub(crate) time_step: f64,
-}
-
-/// Arguments of `draw`.
-#[derive(Debug, Args)]
-pub(crate) struct DrawArguments {
-    /// Job file (TOML or JSON)
-    pub(crate) job: PathBuf,
-    /// Index of the realization, from 0
-    #[arg(long, value_name = "I")]
-    pub(crate) index: u64,
-    /// Use the best point of DIR/result.json instead of the job's fixed and start values
-    #[arg(long, value_name = "DIR")]
-    pub(crate) at: Option<PathBuf>,
-    /// With --at, use the best point of this group of the data
-    #[arg(long, value_name = "NAME", requires = "at")]
-    pub(crate) group: Option<String>,
 }
 
 /// Arguments of `coordinator`.

@@ -5,6 +5,7 @@ mod check;
 mod coordinator;
 mod draw;
 mod jobs;
+mod observe;
 mod operators;
 mod run;
 mod schema;
@@ -34,6 +35,10 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
             unless_interrupted(check::check(arguments, isa, cores), NOTHING_LEFT).await
         }
         Resolved::Draw(arguments) => draw::draw(&arguments),
+        Resolved::Observe { arguments, isa, threads } => {
+            let left = "no file was written";
+            unless_interrupted(observe::observe(arguments, isa, threads), left).await
+        }
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
         Resolved::Worker { config, files, unused } => worker::serve(config, &files, &unused).await,
         Resolved::Certs(arguments) => certs::make(&arguments),

@@ -13,9 +13,11 @@ mod environment;
 mod exit_status;
 #[cfg(test)]
 mod fuzz;
+mod job_point;
 mod listener_security;
 mod log_filter;
 mod new_files;
+mod observations;
 mod output;
 mod program;
 mod progress;

@@ -27,12 +27,7 @@ pub(crate) struct NewFile {
 /// If one of them already exists (bad input), or cannot be written.
 pub(crate) fn create(files: &[NewFile]) -> Result<(), CommandFailure> {
     for NewFile { path, .. } in files {
-        if path.symlink_metadata().is_ok() {
-            return Err(CommandFailure::bad_input(anyhow!(
-                "{} already exists and is not overwritten; remove it, or choose another path",
-                visible::path(path)
-            )));
-        }
+        refuse_existing(path)?;
     }
     for (made, file) in files.iter().enumerate() {
         if let Err(error) = write(file) {
@@ -43,6 +38,20 @@ pub(crate) fn create(files: &[NewFile]) -> Result<(), CommandFailure> {
             let context = format!("cannot write {}", visible::path(&file.path));
             return Err(CommandFailure::unusable_path(error, context));
         }
+    }
+    Ok(())
+}
+
+/// Refuses a path at which there is something already.
+///
+/// # Errors
+/// If there is.
+pub(crate) fn refuse_existing(path: &Path) -> Result<(), CommandFailure> {
+    if path.symlink_metadata().is_ok() {
+        return Err(CommandFailure::bad_input(anyhow!(
+            "{} already exists and is not overwritten; remove it, or choose another path",
+            visible::path(path)
+        )));
     }
     Ok(())
 }

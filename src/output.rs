@@ -9,6 +9,7 @@ use std::path::Path;
 
 use osteon_common::case::Setup;
 use osteon_common::job::JobSpecification;
+use osteon_common::parameters::Point;
 use osteon_common::sampling::NominalSampling;
 use osteon_files::report::{ResultFile, Solver};
 use osteon_proto::v1::{BackupEnd, BannedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot};
@@ -16,6 +17,7 @@ use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Failure, FirstSignal, GuidedWaves, Isa};
 
 use crate::cost::JobCost;
+use crate::observations::ObservationSummary;
 use crate::resolved::OutputFormat;
 
 /// A result to show.
@@ -57,6 +59,17 @@ pub(crate) struct ShownCost<'a> {
     pub(crate) isa: Isa,
 }
 
+/// The observables of a job's realizations to show.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShownObservations<'a> {
+    /// The point of the realizations.
+    pub(crate) point: &'a Point,
+    /// Their summary.
+    pub(crate) summary: &'a ObservationSummary,
+    /// The file with a row for each, if it was written.
+    pub(crate) file: Option<&'a Path>,
+}
+
 /// Returns the object `solver` of one solved case, with the sampling that was decisive, if known.
 fn solver_of(setup: &Setup, arrival: Option<&Arrival>) -> Solver<Option<f64>> {
     let error = arrival.map(|arrival| arrival.estimated_error);
@@ -79,6 +92,8 @@ pub(crate) trait Output {
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()>;
     /// Prints what a job will do and cost.
     fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()>;
+    /// Prints the observables of a job's realizations.
+    fn observations(&mut self, observations: &ShownObservations<'_>) -> io::Result<()>;
     /// Prints the id of an accepted job.
     fn submitted(&mut self, job: &str) -> io::Result<()>;
     /// Prints all jobs, and the workers that are banned.

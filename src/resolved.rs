@@ -12,9 +12,9 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
-    CredentialArguments, DrawArguments, JobsArguments, JobsCommand, RunArguments, SchemaArguments,
-    SimulateArguments, SubmitArguments, TokenArguments, WorkerArguments, WorkersArguments,
-    WorkersCommand,
+    CredentialArguments, DrawArguments, JobsArguments, JobsCommand, ObserveArguments, RunArguments,
+    SchemaArguments, SimulateArguments, SubmitArguments, TokenArguments, WorkerArguments,
+    WorkersArguments, WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
@@ -61,6 +61,15 @@ pub(crate) enum Resolved {
     },
     /// `draw`.
     Draw(DrawArguments),
+    /// `observe`.
+    Observe {
+        /// The job and the requested output.
+        arguments: ObserveArguments,
+        /// The instruction set to compute on.
+        isa: Isa,
+        /// Number of threads.
+        threads: u32,
+    },
     /// `coordinator`.
     Coordinator(CoordinatorArguments),
     /// `worker`.
@@ -233,6 +242,10 @@ impl Resolved {
             Command::Simulate(arguments) => Self::Simulate { arguments, isa: isa()? },
             Command::Check(arguments) => Self::Check { arguments, isa: isa()?, cores },
             Command::Draw(arguments) => Self::Draw(arguments),
+            Command::Observe(arguments) => {
+                let threads = arguments.threads.unwrap_or(cores);
+                Self::Observe { arguments, isa: isa()?, threads }
+            }
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
             Command::Worker(arguments) => {
                 let endpoint = environment.needed(arguments.coordinator.clone())?;

@@ -32,6 +32,15 @@ impl Extremum {
             Self::Second => "second",
         }
     }
+
+    /// Returns the criterion that this one is not.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::First => Self::Second,
+            Self::Second => Self::First,
+        }
+    }
 }
 
 /// The criterion of the first arriving signal.

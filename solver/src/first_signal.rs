@@ -3,6 +3,8 @@
 use std::f64::consts::LN_10;
 
 use osteon_common::case::{Bone, Setup};
+use osteon_common::outcome::FailureKind;
+use osteon_common::realization::Ensemble;
 use osteon_common::settings::{Extremum, Picking};
 
 use crate::picking::{mean, slope};
@@ -28,7 +30,34 @@ pub struct FirstSignal {
     pub center_frequency: Option<f64>,
 }
 
+/// One realization with a velocity, and what else its first signal tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObservedRealization {
+    /// Velocity, m/s: that of [`Solver::realization`], to the bit.
+    pub velocity: f64,
+    /// The other observables.
+    pub signal: FirstSignal,
+}
+
 impl Solver {
+    /// Computes all observables of realization `index` of an ensemble.
+    ///
+    /// # Errors
+    /// If it has no velocity.
+    pub fn observed_realization(
+        &self,
+        ensemble: &Ensemble,
+        index: u64,
+        workspace: &mut Workspace,
+    ) -> Result<ObservedRealization, FailureKind> {
+        let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
+        let own = ensemble.own_setup(index, self.setup()).map(|own| self.beside(&own));
+        let solver = own.as_ref().unwrap_or(self);
+        let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
+        let signal = solver.first_signal(&bone, &arrival, workspace);
+        Ok(ObservedRealization { velocity: arrival.velocity, signal })
+    }
+
     /// Computes the other observables of the first signal of a bone, of which `arrival` is the arrival.
     /// The case is solved once more, with the other extremum.
     pub fn first_signal(
@@ -38,10 +67,7 @@ impl Solver {
         workspace: &mut Workspace,
     ) -> FirstSignal {
         let setup = self.setup();
-        let other_extremum = match setup.picking.extremum {
-            Extremum::First => Extremum::Second,
-            Extremum::Second => Extremum::First,
-        };
+        let other_extremum = setup.picking.extremum.other();
         let picking = Picking { extremum: other_extremum, ..setup.picking };
         let other = self.beside(&Setup { picking, ..*setup }).arrival(bone, workspace);
         let distances: Vec<f64> = setup.probe.distances().collect();

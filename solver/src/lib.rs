@@ -36,7 +36,7 @@ pub use exact::quantities::{admittance, fastest_wave};
 #[cfg(feature = "measure")]
 pub use exact::stages;
 pub use exact::traces::{TraceError, Traces};
-pub use first_signal::FirstSignal;
+pub use first_signal::{FirstSignal, ObservedRealization};
 pub use hybrid::{Hybrid, HybridWorkspace};
 pub use isa::{Isa, UnknownIsa};
 pub use solver::{Arrival, Failure, PassSummary, Sampled, Solver, Workspace};

@@ -1,6 +1,7 @@
 //! Output for programs: one JSON value per command, without inf or NaN.
 
 mod cost;
+mod observations;
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -17,7 +18,7 @@ use osteon_solver::check::{Difference, MethodSolution};
 use osteon_solver::{FirstSignal, GuidedWave, GuidedWaves};
 use serde_json::{Value, json};
 
-use super::{Output, ShownCost, ShownResult, ShownSimulation, solver_of};
+use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation, solver_of};
 use crate::output::text::operators::worker_state_name;
 use crate::output::text::{kind_name, state_name, status_name};
 use crate::output::times::utc;
@@ -50,6 +51,10 @@ impl Output for JsonOutput<'_> {
 
     fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()> {
         self.value(&cost::value(cost))
+    }
+
+    fn observations(&mut self, observations: &ShownObservations<'_>) -> io::Result<()> {
+        self.value(&observations::value(observations))
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {

@@ -13,6 +13,7 @@ use crate::sample_result::{identification, propagation};
 
 mod cost;
 mod jobs;
+mod observations;
 mod posterior;
 mod simulation;
 

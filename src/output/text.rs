@@ -8,6 +8,7 @@ mod groups;
 mod identified;
 mod layout;
 mod number;
+mod observations;
 pub(super) mod operators;
 mod posterior;
 mod result;
@@ -24,7 +25,7 @@ use osteon_proto::v1::{
 
 use self::layout::{WIDTH, aligned, glued, wrapped};
 use self::number::significant;
-use super::{Output, ShownCost, ShownResult, ShownSimulation};
+use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation};
 use crate::client;
 use crate::progress::{JobProgress, line, span};
 
@@ -53,6 +54,10 @@ impl Output for TextOutput<'_> {
 
     fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()> {
         self.verbatim(&cost::table(cost))
+    }
+
+    fn observations(&mut self, observations: &ShownObservations<'_>) -> io::Result<()> {
+        self.verbatim(&observations::table(observations))
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {

@@ -137,8 +137,8 @@ mod tests {
         let weights = MomentWeights::of_covariance(COVARIANCE).unwrap();
         let radius = weights.relative_squares(0.25).sqrt();
         let angles = (0..360).map(|degrees| f64::from(degrees).to_radians());
-        let squares =
-            angles.map(|angle| weights.square([radius * angle.cos(), radius * angle.sin()]));
+        let squares = angles
+            .map(|angle| weights.square([radius * libm::cos(angle), radius * libm::sin(angle)]));
         let largest = squares.fold(0.0, f64::max);
         assert!((0.1..=0.25).contains(&largest), "{largest}");
     }

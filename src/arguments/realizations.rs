@@ -1,0 +1,48 @@
+//! The arguments of commands for single realizations of a job.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// Arguments of `draw`.
+#[derive(Debug, Args)]
+pub(crate) struct DrawArguments {
+    /// Job file (TOML or JSON)
+    pub(crate) job: PathBuf,
+    /// Index of the realization, from 0
+    #[arg(long, value_name = "I")]
+    pub(crate) index: u64,
+    /// The point.
+    #[command(flatten)]
+    pub(crate) place: PlaceArguments,
+}
+
+/// Point of a job whose realizations are meant.
+#[derive(Debug, Args)]
+pub(crate) struct PlaceArguments {
+    /// Use the best point of DIR/result.json instead of the job's fixed and start values
+    #[arg(long, value_name = "DIR")]
+    pub(crate) at: Option<PathBuf>,
+    /// With --at, use the best point of this group of the data
+    #[arg(long, value_name = "NAME", requires = "at")]
+    pub(crate) group: Option<String>,
+}
+
+/// Arguments of `observe`.
+#[derive(Debug, Args)]
+pub(crate) struct ObserveArguments {
+    /// Job file (TOML or JSON)
+    pub(crate) job: PathBuf,
+    /// The point.
+    #[command(flatten)]
+    pub(crate) place: PlaceArguments,
+    /// Number of threads to compute on [default: all cores]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) threads: Option<u32>,
+    /// New CSV file with one row for each realization
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}

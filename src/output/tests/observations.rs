@@ -1,0 +1,57 @@
+//! Output of `observe`.
+
+use osteon_common::outcome::FailureCounts;
+use osteon_common::settings::Extremum;
+
+use super::*;
+use crate::observations::{ObservableMoments, ObservationSummary};
+
+fn column(count: u64, mean: f64, standard_deviation: f64, correlation: f64) -> ObservableMoments {
+    ObservableMoments {
+        count,
+        mean: Some(mean),
+        standard_deviation: Some(standard_deviation),
+        correlation: Some(correlation),
+    }
+}
+
+fn printed_summary(summary: &ObservationSummary) -> String {
+    let specification = specification(JobKind::Propagation, &[]);
+    let point = specification.start();
+    let file = Some(Path::new("observed.csv"));
+    let shown = ShownObservations { point: &point, summary, file };
+    printed(OutputFormat::Text, |output| output.observations(&shown).unwrap())
+}
+
+#[test]
+fn observables_are_a_table() {
+    let mut failures = FailureCounts::default();
+    failures.add(FailureKind::NoArrival, 4);
+    let summary = ObservationSummary {
+        other_extremum: Extremum::Second,
+        realizations: 2747,
+        failures,
+        columns: [
+            column(2743, 3907.686_064, 104.389_4, 1.0),
+            column(2740, 3877.868_02, 99.964_35, 0.998_08),
+            column(2743, 4.664_727, 0.413_784, 0.231_5),
+            column(2740, 1.040_4e6, 13.7e3, -0.330_2),
+        ],
+    };
+    insta::assert_snapshot!(printed_summary(&summary));
+}
+
+#[test]
+fn what_no_realization_has_is_left_out() {
+    let nothing =
+        ObservableMoments { count: 0, mean: None, standard_deviation: None, correlation: None };
+    let mut failures = FailureCounts::default();
+    failures.add(FailureKind::DirectWaveFirst, 1);
+    let summary = ObservationSummary {
+        other_extremum: Extremum::First,
+        realizations: 1,
+        failures,
+        columns: [nothing; 4],
+    };
+    insta::assert_snapshot!(printed_summary(&summary));
+}
