@@ -32,10 +32,10 @@ fn observables_are_a_table() {
         realizations: 2747,
         failures,
         columns: [
-            column(2743, 3907.686_064, 104.389_4, 1.0),
-            column(2740, 3877.868_02, 99.964_35, 0.998_08),
-            column(2743, 4.664_727, 0.413_784, 0.231_5),
-            column(2740, 1.040_4e6, 13.7e3, -0.330_2),
+            column(2743, 3907.69, 104.39, 1.0),
+            column(2740, 3877.87, 99.96, 0.998),
+            column(2743, 4.6647, 0.4138, 0.232),
+            column(2740, 1.0404e6, 13.7e3, -0.33),
         ],
     };
     insta::assert_snapshot!(printed_summary(&summary));
