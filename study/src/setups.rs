@@ -25,9 +25,17 @@ use crate::{RowCallback, StudyError};
 
 /// Default number of cases of the study.
 pub const REALIZATIONS: u64 = 1000;
-/// Classes of the array's span, m, each with its upper limit.
-const CLASSES: [(f64, &str); 4] =
-    [(1e-3, "below 1"), (3e-3, "1 to 3"), (8e-3, "3 to 8"), (f64::INFINITY, "above 8")];
+/// Classes of the time that a wave of [`SPEED`] takes along the array, in periods of the centre
+/// frequency, each with its upper limit.
+const CLASSES: [(f64, &str); 5] = [
+    (0.2, "below 0.2"),
+    (0.5, "0.2 to 0.5"),
+    (1.0, "0.5 to 1"),
+    (3.0, "1 to 3"),
+    (f64::INFINITY, "above 3"),
+];
+/// Usual speed of waves along bone, m/s.
+const SPEED: f64 = 4000.0;
 /// Relative error that is wanted of 99 of 100 velocities.
 const WANTED: f64 = 1e-4;
 /// Maximum number of pairs of a case, at refinement 1 and at the reference's, which limits the
@@ -88,7 +96,7 @@ struct MeasuredSetup {
 }
 
 /// Returns the relative errors of velocities at default settings compared to refinement 5, for
-/// cases whose layers, probe and bone are drawn at random, by the array's span; an error is kept if it
+/// cases whose layers, probe and bone are drawn at random, by the array's length; an error is kept if it
 /// is not larger than stated, that of the reference included. Cases with a different outcome, or with
 /// an error that is not kept, are reported individually.
 ///
@@ -100,7 +108,7 @@ pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, 
         progress(&one.described());
     }
     let mut table = MarkdownTable::new(&[
-        "span of the array (mm)",
+        "length of the array (periods)",
         "cases",
         "with a velocity",
         "median error",
@@ -115,7 +123,7 @@ pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, 
     let mut from = 0.0;
     for (to, name) in CLASSES {
         let class: Vec<&MeasuredSetup> =
-            measured.iter().filter(|one| (from..to).contains(&one.span())).collect();
+            measured.iter().filter(|one| (from..to).contains(&one.periods())).collect();
         let mut row = vec![name.to_owned()];
         row.extend(summary(&class));
         table.push(row);
@@ -165,10 +173,12 @@ impl MeasuredSetup {
         Self { index, drawn, found, reference, difference }
     }
 
-    /// Returns the distance from the first to the last receiver, m.
-    fn span(&self) -> f64 {
-        let receivers = &self.drawn.setup.probe.receivers;
-        f64::from(receivers.count - 1) * receivers.pitch
+    /// Returns the time that a wave of the usual speed takes from the first to the last receiver, in
+    /// periods.
+    fn periods(&self) -> f64 {
+        let probe = &self.drawn.setup.probe;
+        let span = f64::from(probe.receivers.count - 1) * probe.receivers.pitch;
+        span / SPEED * probe.center_frequency
     }
 
     fn is_remarkable(&self) -> bool {

@@ -5,6 +5,7 @@ use osteon_common::parameters::Parameter;
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::significant;
+use super::result::{readable, scale};
 use crate::cost::{JobCost, PlaceCost};
 use crate::output::ShownCost;
 use crate::progress::span;
@@ -110,8 +111,9 @@ fn worst(specification: &JobSpecification, cost: &JobCost) -> String {
     let mut sentences = Vec::new();
     if let Some(worst) = cost.worst() {
         let at = specification.free().map(|parameter| {
-            let value = significant(worst.point.get(parameter), POINT_DIGITS);
-            glued(&format!("{} {value}", parameter.name()))
+            let (factor, unit) = scale(parameter);
+            let value = significant(factor * worst.point.get(parameter), POINT_DIGITS);
+            glued(&format!("{} {value}{unit}", readable(parameter)))
         });
         sentences.push(format!("the worst has {}", at.collect::<Vec<_>>().join(", ")));
     }

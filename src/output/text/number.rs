@@ -76,8 +76,8 @@ pub(super) fn significant(value: f64, digits: usize) -> String {
     if !(-4..=9).contains(&exponent) {
         return format!("{value:.*e}", digits.saturating_sub(1));
     }
-    let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
-    let plain = format!("{value:.decimals$}");
+    let plain = Decimals::new(value, digits)
+        .map_or_else(|| format!("{value}"), |decimals| decimals.show(value));
     if plain.contains('.') {
         plain.trim_end_matches('0').trim_end_matches('.').to_owned()
     } else {
@@ -144,6 +144,7 @@ mod tests {
             (1598.8, 6, "1598.8"),
             (12.0, 6, "12"),
             (1500.0, 3, "1500"),
+            (6_083_934_201.0, 3, "6080000000"),
             (0.02, 6, "0.02"),
             (1e-12, 3, "1.00e-12"),
             (0.0, 3, "0"),
