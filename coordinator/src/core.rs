@@ -20,6 +20,7 @@ pub(crate) mod rate;
 pub mod reactor;
 pub(crate) mod realization_time;
 pub mod sanity;
+pub(crate) mod service_order;
 pub(crate) mod snapshot;
 pub mod state;
 pub(crate) mod worker_list;

@@ -40,6 +40,10 @@ pub(crate) struct Job {
     pub(crate) rate: Rate,
     /// Duration of its realizations.
     pub(crate) pace: RealizationTime,
+    /// The rate of all workers at it, as last measured.
+    pub(crate) fleet: Option<FleetRate>,
+    /// Number of workers that have answered a batch of it, each stay counted.
+    pub(crate) rated_workers: u64,
     /// The newest duplicate of one of its overdue batches.
     pub(crate) newest_overdue_duplicate: Option<BatchId>,
     /// Sequence number of its last published snapshot.
@@ -70,6 +74,8 @@ impl Job {
             cancelled: false,
             rate: Rate::default(),
             pace: RealizationTime::default(),
+            fleet: None,
+            rated_workers: 0,
             newest_overdue_duplicate: None,
             sequence: sequence(0, now),
             progressed: now,
@@ -99,6 +105,21 @@ impl Job {
         };
         asked_for.into_iter().chain(&mut self.speculation.evaluations)
     }
+}
+
+/// The rate of all workers at one job.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FleetRate {
+    /// Of all workers that are expected to answer, realizations per second.
+    pub(crate) total: f64,
+    /// Mean of one slot, realizations per second.
+    pub(crate) per_slot: f64,
+    /// [`Job::rated_workers`] when it was measured.
+    pub(crate) rated_workers: u64,
+    /// [`State::fleet_changes`](crate::core::state::State::fleet_changes) when it was measured.
+    pub(crate) changes: u64,
+    /// Number of batches for which it has been used.
+    pub(crate) uses: u64,
 }
 
 /// Progress of a job.

@@ -89,9 +89,11 @@ impl Probation {
         !self.0.is_empty() && self.0.remove(name).is_some()
     }
 
-    /// Forgets workers that have given no reason for a long time.
-    pub(crate) fn forget(&mut self, now: Duration) {
+    /// Forgets workers that have given no reason for a long time, and returns whether there were any.
+    pub(crate) fn forget(&mut self, now: Duration) -> bool {
+        let before = self.0.len();
         self.0.retain(|_, trial| now.saturating_sub(trial.last) < MEMORY);
+        self.0.len() < before
     }
 
     /// Returns whether a worker has left a batch unanswered since its probation began.

@@ -65,6 +65,9 @@ pub enum Inconsistency {
     /// A speculative evaluation is not of one of the candidate points.
     #[error("job {0} has a speculative evaluation that is not a candidate of its search")]
     Speculation(JobId),
+    /// A worker does not have the place that it should have in the order of service.
+    #[error("worker {0} has a wrong place in the order of service")]
+    Order(WorkerId),
     /// The next identifier is not above all that are in use.
     #[error("an identifier would be assigned twice")]
     Numbers,
@@ -78,6 +81,9 @@ pub fn sanity_check(state: &State) -> Result<(), Inconsistency> {
     check_jobs(state)?;
     check_workers(state)?;
     check_batches(state)?;
+    if let Some(worker) = state.misplaced() {
+        return Err(Inconsistency::Order(worker));
+    }
     for (&id, job) in &state.jobs {
         for evaluation in job.evaluations() {
             check_evaluation(state, id, evaluation)?;

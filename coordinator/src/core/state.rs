@@ -21,6 +21,7 @@ use crate::core::job::{EndedJob, Job, RequestName, Stage};
 use crate::core::notice::Departure;
 use crate::core::probation::Probation;
 use crate::core::rate::Rate;
+use crate::core::service_order::ServiceOrder;
 use crate::core::worker_name::WorkerName;
 use crate::store::BanRecord;
 
@@ -78,6 +79,10 @@ pub struct State {
     /// Time since which no worker has been attached; meaningless while there is one.
     pub(crate) no_worker_since: Duration,
     pub(crate) batches: BTreeMap<BatchId, Batch>,
+    /// The workers that can accept more.
+    pub(crate) order: ServiceOrder,
+    /// Number of changes of the workers that share the work: attachments, departures, probations.
+    pub(crate) fleet_changes: u64,
     /// Overdue batches that wait for a duplicate on another worker; of several duplicates only the
     /// newest is listed.
     pub(crate) overdue: BTreeSet<BatchId>,
@@ -184,6 +189,8 @@ impl State {
             probation: Probation::default(),
             no_worker_since: now,
             batches: BTreeMap::new(),
+            order: ServiceOrder::default(),
+            fleet_changes: 0,
             overdue: BTreeSet::new(),
             next_job: 1,
             next_lease: 1,
@@ -345,6 +352,7 @@ impl State {
                 worker.settled.pop_front();
             }
         }
+        self.reorder(settled.worker);
         for duplicate in &settled.duplicates {
             if let Some(duplicate) = self.batches.get_mut(duplicate) {
                 duplicate.duplicates.retain(|other| *other != batch);

@@ -50,13 +50,17 @@ pub(crate) fn dispatch(turn: &mut Turn) {
 /// Sends one check or batch to the first free worker that is eligible for it, and returns whether
 /// there was one. The workers in `kept` receive nothing.
 fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
-    let mut free = schedule::free_workers(turn.state, kept);
-    let first = free.first().and_then(|first| turn.state.workers.get(first));
-    if !schedule::checks_wait(turn.state) && first.is_some_and(|first| turn.state.is_sound(first)) {
+    let Some(first) = schedule::free_workers(turn.state, kept).next() else {
+        return false;
+    };
+    let is_sound =
+        |worker| turn.state.workers.get(&worker).is_some_and(|it| turn.state.is_sound(it));
+    if !schedule::checks_wait(turn.state) && is_sound(first) {
         // Without checks, all sound workers are eligible for the same batches, so the first is
         // enough.
-        free.truncate(1);
+        return hand_batch(turn, first);
     }
+    let free: Vec<WorkerId> = schedule::free_workers(turn.state, kept).collect();
     free.into_iter().any(|worker| audits::hand_check(turn, worker) || hand_batch(turn, worker))
 }
 
@@ -71,8 +75,13 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     let Some(attached) = turn.state.workers.get(&worker) else {
         return false;
     };
+    let queued = evaluation.queued();
     let size = if turn.state.is_sound(attached) {
-        sizing::batch_size(turn.state, attached, job, evaluation.queued())
+        let fleet = sizing::fleet_rate(turn.state, job);
+        let Some(attached) = turn.state.workers.get(&worker) else {
+            return false;
+        };
+        sizing::batch_size(turn.state, attached, job, fleet, queued)
     } else if !turn.state.probation.is_paused(&attached.name, turn.now)
         || !turn.state.answers_batches(|_| true)
     {

@@ -41,6 +41,7 @@ pub(crate) fn send(
     if let Some(worker) = turn.state.workers.get_mut(&worker) {
         worker.in_flight.push(id);
     }
+    turn.state.reorder(worker);
     turn.effects.push(Effect::Send { worker, batch: id, work });
     Some(id)
 }

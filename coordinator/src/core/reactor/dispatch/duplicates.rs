@@ -1,10 +1,13 @@
 //! Duplicates of slow batches for idle workers: the first answer counts.
 
-use super::{batches, eta, schedule};
+use std::time::Duration;
+
+use super::{batches, eta};
 use crate::core::batch::Batch;
 use crate::core::ids::{BatchId, WorkerId};
 use crate::core::reactor::turn::Turn;
-use crate::core::state::{AttachedWorker, State};
+use crate::core::service_order::Place;
+use crate::core::state::State;
 
 /// A batch that has taken this many times its expected time is duplicated before anything is
 /// computed speculatively.
@@ -14,16 +17,16 @@ const LATE: u32 = 2;
 /// been out longest.
 pub(crate) fn duplicate_late_batches(turn: &mut Turn) {
     let now = turn.now;
-    let idle = |state: &State, worker: &AttachedWorker| schedule::held(state, worker) == 0;
     let late = |state: &State, batch: &Batch| {
         now.saturating_sub(batch.sent) >= LATE * eta::expected(state, batch)
     };
+    let idle = |place: &Place| place.held == 0;
     duplicate(turn, idle, late);
 }
 
 /// Sends each worker that holds nothing a duplicate of the batch that has been out longest.
 pub(crate) fn duplicate_slow_batches(turn: &mut Turn) {
-    duplicate(turn, |_, worker| worker.in_flight.is_empty(), |_, _| true);
+    duplicate(turn, |place| place.in_flight == 0, |_, _| true);
 }
 
 /// Sends each worker that is `idle` a duplicate of the batch that has been out longest among those
@@ -31,25 +34,25 @@ pub(crate) fn duplicate_slow_batches(turn: &mut Turn) {
 /// duplicated.
 fn duplicate(
     turn: &mut Turn,
-    idle: impl Fn(&State, &AttachedWorker) -> bool,
+    idle: impl Fn(&Place) -> bool,
     worth: impl Fn(&State, &Batch) -> bool,
 ) {
-    let (state, now) = (&*turn.state, turn.now);
-    let patience = state.config.batch_target / 2;
-    let old = |batch: &Batch| now.saturating_sub(batch.sent) >= patience;
-    if !open(state).next().is_some_and(|(_, oldest)| old(oldest)) {
-        return;
-    }
-    let idle = |worker: &AttachedWorker| state.is_sound(worker) && idle(state, worker);
-    let idle: Vec<WorkerId> =
-        state.workers.iter().filter(|(_, worker)| idle(worker)).map(|(id, _)| *id).collect();
-    for worker in idle {
-        let state = &*turn.state;
-        let is_worth = |(_, batch): &(BatchId, &Batch)| old(batch) && worth(state, batch);
-        let Some((slowest, _)) = open(state).find(is_worth) else {
+    let patience = turn.state.config.batch_target / 2;
+    let old = |batch: &Batch, now: Duration| now.saturating_sub(batch.sent) >= patience;
+    loop {
+        let (state, now) = (&*turn.state, turn.now);
+        if !open(state).next().is_some_and(|(_, oldest)| old(oldest, now)) {
+            return;
+        }
+        // Those that hold least come first; the duplicate makes the worker busy.
+        let first = state.order.iter().next().filter(|place| !place.on_probation && idle(place));
+        let is_worth = |(_, batch): &(BatchId, &Batch)| old(batch, now) && worth(state, batch);
+        let (Some(idle), Some((slowest, _))) = (first, open(state).find(is_worth)) else {
             return;
         };
-        send(turn, slowest, worker);
+        if send(turn, slowest, idle.worker).is_none() {
+            return;
+        }
     }
 }
 

@@ -30,7 +30,9 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     if next(turn.state).is_none() {
         return;
     }
-    let idle = turn.state.workers.iter().map(|(id, worker)| (*id, spare(turn.state, worker)));
+    // Those that hold a speculative batch get no other.
+    let without = (0..BATCHES_IN_FLIGHT_MAX).flat_map(|held| turn.state.order.holding(held));
+    let idle = without.filter_map(|id| Some((id, spare(turn.state, turn.state.workers.get(&id)?))));
     let idle: Vec<(WorkerId, u64)> = idle.filter(|(_, slots)| *slots > 0).collect();
     let mut slots: u64 = idle.iter().map(|(_, slots)| slots).sum();
     let etas = eta::etas(turn.state);
@@ -131,13 +133,14 @@ fn has_next(job: &Job) -> bool {
 
 /// Sends a batch of a point to the idle slots of a worker.
 fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId) {
+    let fleet = sizing::fleet_rate(turn.state, id);
     let (Some(job), Some(attached)) = (turn.state.jobs.get(&id), turn.state.workers.get(&worker))
     else {
         return;
     };
     let (queued, spare) = (queued(job, &point), spare(turn.state, attached));
     let size = match batches::realizations_held(turn.state, attached) {
-        0 => sizing::batch_size(turn.state, attached, id, queued).max(spare.min(queued)),
+        0 => sizing::batch_size(turn.state, attached, id, fleet, queued).max(spare.min(queued)),
         _ => spare,
     };
     let Some((attempt, indices)) = take(turn.state, id, point, size) else {

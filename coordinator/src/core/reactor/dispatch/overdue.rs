@@ -42,7 +42,9 @@ const SILENT_MAX: Duration = Duration::from_secs(60);
 
 /// Finds batches that are overdue.
 pub(crate) fn tick(turn: &mut Turn) {
-    turn.state.probation.forget(turn.now);
+    if turn.state.probation.forget(turn.now) {
+        probation_changed(turn.state);
+    }
     let late = turn.state.batches.keys().filter(|id| is_overdue(turn.state, **id, turn.now));
     let late: Vec<BatchId> = late.copied().collect();
     for id in &late {
@@ -137,7 +139,7 @@ pub(crate) fn dispatch(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
         return;
     }
     let busy = schedule::work_waits(turn.state);
-    let mut free = schedule::free_workers(turn.state, kept);
+    let mut free: Vec<WorkerId> = schedule::free_workers(turn.state, kept).collect();
     let mut sent = 0;
     for id in Vec::from_iter(turn.state.overdue.iter().copied()) {
         let Some(batch) = turn.state.batches.get(&id) else {
@@ -341,6 +343,7 @@ pub(crate) fn missed(state: &mut State, id: BatchId, now: Duration) {
 /// reason for its probation.
 pub(crate) fn begin_probation(state: &mut State, name: &WorkerName, sent: Duration, now: Duration) {
     if state.probation.miss(name, sent, now) {
+        probation_changed(state);
         tracing::warn!(worker = %name, "this worker gives signs of life and does not answer what it \
             holds; until it does it gets one realization at a time");
     }
@@ -352,7 +355,8 @@ pub(crate) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now:
         return;
     };
     worker.missed.count = 0;
-    if state.probation.end(&worker.name) {
+    let ended = state.probation.end(&worker.name);
+    if ended {
         tracing::info!(worker = %worker.name, "this worker answers again");
     }
     for later in worker.in_flight.iter().filter(|held| **held > batch) {
@@ -360,4 +364,13 @@ pub(crate) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now:
             later.begun = now;
         }
     }
+    if ended {
+        probation_changed(state);
+    }
+}
+
+/// Follows a change of the probations, which is rare.
+fn probation_changed(state: &mut State) {
+    state.reorder_all();
+    state.fleet_changes += 1;
 }

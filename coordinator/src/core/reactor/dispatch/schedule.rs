@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use crate::core::batch::Purpose;
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::Job;
-use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
+use crate::core::state::{AttachedWorker, State};
 use crate::store::JobRecord;
 
 /// Returns whether anything besides quarantined realizations waits to be sent.
@@ -14,23 +14,12 @@ pub(crate) fn work_waits(state: &State) -> bool {
     next_job(state).is_some() || checks_wait(state)
 }
 
-/// Returns the workers that can accept more, in ascending order of the batches they hold; ties go
-/// to the first. Those on probation come last, and only if they hold nothing.
-pub(crate) fn free_workers(state: &State, kept: &BTreeSet<WorkerId>) -> Vec<WorkerId> {
-    let exclusive = |worker| state.held_for(worker, Purpose::Exclusive).next().is_some();
-    let free = state
-        .workers
-        .iter()
-        .filter(|(id, worker)| !worker.draining && !kept.contains(id))
-        .filter(|(_, worker)| !exclusive(worker))
-        .map(|(id, worker)| {
-            (!state.is_sound(worker), held(state, worker), worker.in_flight.len(), *id)
-        });
-    let mut free: Vec<(bool, usize, usize, WorkerId)> = free.collect();
-    free.sort_unstable();
-    let most = |on_probation| if on_probation { 1 } else { BATCHES_IN_FLIGHT_MAX };
-    let free = free.into_iter().filter(|(on_probation, held, ..)| *held < most(*on_probation));
-    free.map(|(.., worker)| worker).collect()
+/// Returns the workers that can accept more, except those in `kept`, in the order of service.
+pub(crate) fn free_workers<'a>(
+    state: &'a State,
+    kept: &'a BTreeSet<WorkerId>,
+) -> impl Iterator<Item = WorkerId> + 'a {
+    state.order.iter().map(|place| place.worker).filter(|worker| !kept.contains(worker))
 }
 
 /// Returns the number of batches that a worker holds, without speculative ones.

@@ -1,10 +1,16 @@
 //! Batch sizes. A worker gets as many realizations as it computes in the target time by its
 //! measured rate, but at most a quarter of its share of the remaining ones, so that all workers
 //! finish together. While its share allows, no batch is smaller than the worker's slots.
+//!
+//! A batch costs the coordinator, which serves one after another, some time. Where many workers share
+//! little work, a share is less than that is worth: then fewer workers get batches that keep them busy
+//! for longer. If one worker would take the time R for all that is left and a batch costs c, batches
+//! of √(R c) make the sum of both shortest.
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
 use crate::core::ids::JobId;
+use crate::core::job::{FleetRate, Job};
 use crate::core::state::{AttachedWorker, State};
 
 /// Realizations for each slot in a worker's first batch of a job: enough to measure its rate, few
@@ -14,21 +20,34 @@ const FIRST_BATCH_PER_SLOT: u32 = 4;
 /// realizations. It may hold more to give each of the worker's slots one realization, but never
 /// more than the share.
 const SHARE_DIVISOR: f64 = 4.0;
+/// Time that a batch costs the coordinator, s.
+const BATCH_COST_S: f64 = 1e-4;
+/// Time that a batch takes its worker, s, from which on its cost does not matter.
+const WORTH_S: f64 = 0.02;
+/// Number of batches for which the rate of a fleet is used at least.
+const USES_MIN: u64 = 32;
 
 /// Returns the number of realizations of `job`, of which `queued` are left, that `attached` gets at
 /// once: as many as it computes in the target time, at most a quarter of its share. Both limits
 /// give way to one realization for each slot (a realization may take longer than the target, and a
-/// share may hold fewer than four for each slot), but the share itself does not.
-pub(crate) fn batch_size(state: &State, attached: &AttachedWorker, job: JobId, queued: u64) -> u64 {
-    let per_slot = mean_rate_per_slot(state, job);
-    let weight = |worker: &AttachedWorker| {
-        worker.rates.get(&job).copied().unwrap_or(f64::from(worker.hello.slots) * per_slot)
-    };
-    let total: f64 = state.workers.values().filter(|it| state.is_sound(it)).map(weight).sum();
-    let share = queued as f64 * weight(attached) / total;
+/// share may hold fewer than four for each slot), but the share itself gives way only to a batch that
+/// is worth its cost.
+pub(crate) fn batch_size(
+    state: &State,
+    attached: &AttachedWorker,
+    job: JobId,
+    fleet: FleetRate,
+    queued: u64,
+) -> u64 {
+    let rate = attached.rates.get(&job).copied();
     let slots = f64::from(attached.hello.slots);
-    let most = (share / SHARE_DIVISOR).max(slots.min(share)).ceil();
-    let target = match attached.rates.get(&job) {
+    let weight = rate.unwrap_or(slots * fleet.per_slot);
+    // A worker may be faster than the fleet was when it was measured.
+    let left = queued as f64;
+    let share = left * (weight / fleet.total.max(weight));
+    let worth = rate.map_or(0.0, |rate| (worth_s(left / rate) * rate).min(left));
+    let most = (share / SHARE_DIVISOR).max(slots.min(share)).max(worth).ceil();
+    let target = match rate {
         Some(rate) => rate * state.config.batch_target.as_secs_f64(),
         None => f64::from(FIRST_BATCH_PER_SLOT) * slots,
     };
@@ -36,13 +55,46 @@ pub(crate) fn batch_size(state: &State, attached: &AttachedWorker, job: JobId, q
     (target.max(slots).min(most) as u64).clamp(1, BATCH_REALIZATIONS_MAX.into())
 }
 
-/// Returns the mean rate of one slot at `job` over the workers with a measured rate; 1 if there is
-/// none.
-fn mean_rate_per_slot(state: &State, job: JobId) -> f64 {
-    let measured = state
+/// Returns the time that a batch should take at least, s, given that of all that is left.
+fn worth_s(left_s: f64) -> f64 {
+    (left_s * BATCH_COST_S).sqrt().min(WORTH_S)
+}
+
+/// Returns the rate of all workers at a job. It is measured again after as many batches as there are
+/// workers, so that each of them pays for one; at once if workers came or went, or if twice as many of
+/// them have computed something of the job.
+pub(crate) fn fleet_rate(state: &mut State, id: JobId) -> FleetRate {
+    let uses_max = USES_MIN.max(state.workers.len() as u64);
+    let changes = state.fleet_changes;
+    if let Some(Job { fleet: Some(fleet), rated_workers, .. }) = state.jobs.get_mut(&id) {
+        let is_current = fleet.changes == changes
+            && fleet.uses < uses_max
+            && *rated_workers < (2 * fleet.rated_workers).max(1);
+        if is_current {
+            fleet.uses += 1;
+            return *fleet;
+        }
+    }
+    let fleet = measured(state, id);
+    if let Some(job) = state.jobs.get_mut(&id) {
+        job.fleet = Some(fleet);
+    }
+    fleet
+}
+
+/// Measures the rate of all workers at a job. Those without a measured rate count with the mean rate
+/// of a slot of the others, or with one realization per second and slot if there are none.
+pub(crate) fn measured(state: &State, id: JobId) -> FleetRate {
+    let rates = |worker: &AttachedWorker| worker.rates.get(&id).copied();
+    let rated = state
         .workers
         .values()
-        .filter_map(|worker| Some((*worker.rates.get(&job)?, f64::from(worker.hello.slots))));
-    let (rates, slots) = measured.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
-    if slots > 0.0 { rates / slots } else { 1.0 }
+        .filter_map(|worker| Some((rates(worker)?, f64::from(worker.hello.slots))));
+    let (all, slots) = rated.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+    let per_slot = if slots > 0.0 { all / slots } else { 1.0 };
+    let weight =
+        |worker: &AttachedWorker| rates(worker).unwrap_or(f64::from(worker.hello.slots) * per_slot);
+    let total = state.workers.values().filter(|it| state.is_sound(it)).map(weight).sum();
+    let rated_workers = state.jobs.get(&id).map_or(0, |job| job.rated_workers);
+    FleetRate { total, per_slot, rated_workers, changes: state.fleet_changes, uses: 1 }
 }

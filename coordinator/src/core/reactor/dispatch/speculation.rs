@@ -118,6 +118,8 @@ fn adopt_batches(state: &mut State, job: JobId, attempt: u64) {
     for id in held {
         if let Some(batch) = state.batches.get_mut(&id) {
             batch.purpose = Purpose::Fill;
+            let worker = batch.worker;
+            state.reorder(worker);
             batches::charge(state, id);
         }
     }

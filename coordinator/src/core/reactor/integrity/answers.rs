@@ -118,6 +118,7 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
     let Some(worker) = state.workers.get_mut(&batch.worker) else {
         return;
     };
+    let is_first = !worker.rates.contains_key(&batch.assignment.job);
     let known = worker.rates.entry(batch.assignment.job).or_insert(rate);
     *known += RATE_WEIGHT * (rate - *known);
     let count = batch.assignment.indices.count;
@@ -125,6 +126,7 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
     let slots = worker.hello.slots;
     let took = fairness::slot_time(seconds, slots);
     if let Some(job) = state.jobs.get_mut(&batch.assignment.job) {
+        job.rated_workers += u64::from(is_first);
         // A worker cannot have computed for longer than the time since the batch was sent.
         job.pace.learn(count, slots, seconds.min(waited_s));
     }

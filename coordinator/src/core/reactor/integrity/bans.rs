@@ -33,9 +33,7 @@ pub(crate) fn ban(turn: &mut Turn, name: &WorkerName, job: JobId, reason: String
     let stays: Vec<WorkerId> = stays.map(|(id, _)| *id).collect();
     for stay in stays {
         // Its batches are not to blame for the end of its stay.
-        if let Some(worker) = turn.state.workers.get_mut(&stay) {
-            worker.draining = true;
-        }
+        workers::begin_draining(turn.state, stay);
         let reason = CloseReason::Banned { reason: reason.clone() };
         workers::close(turn, stay, reason);
     }

@@ -62,6 +62,8 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
             draining: false,
         },
     );
+    turn.state.reorder(worker);
+    turn.state.fleet_changes += 1;
 }
 
 pub(crate) fn seen(state: &mut State, worker: WorkerId, now: Duration) {
@@ -72,9 +74,7 @@ pub(crate) fn seen(state: &mut State, worker: WorkerId, now: Duration) {
 
 pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
     seen(turn.state, worker, turn.now);
-    if let Some(attached) = turn.state.workers.get_mut(&worker) {
-        attached.draining = true;
-    }
+    begin_draining(turn.state, worker);
     batches::preempt(turn, worker);
     departures::dismiss_if_drained(turn, worker);
 }
@@ -85,13 +85,22 @@ pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
 /// # Errors
 /// When no such worker is attached.
 pub(crate) fn send_away(turn: &mut Turn, worker: WorkerId) -> Result<(), Refusal> {
-    let attached = turn.state.workers.get_mut(&worker).ok_or(Refusal::NoWorker { worker })?;
+    let attached = turn.state.workers.get(&worker).ok_or(Refusal::NoWorker { worker })?;
     if !attached.draining {
-        attached.draining = true;
+        begin_draining(turn.state, worker);
         turn.effects.push(Effect::Drain { worker });
         batches::preempt(turn, worker);
     }
     Ok(())
+}
+
+/// Lets a worker accept no more batches.
+pub(crate) fn begin_draining(state: &mut State, worker: WorkerId) {
+    if let Some(attached) = state.workers.get_mut(&worker) {
+        attached.draining = true;
+        state.reorder(worker);
+        state.fleet_changes += 1;
+    }
 }
 
 /// Closes a worker's stream; the batches that it held are reassigned.
@@ -162,9 +171,7 @@ pub(crate) fn drain_all(turn: &mut Turn) {
     let workers: Vec<WorkerId> = turn.state.workers.keys().copied().collect();
     for worker in workers {
         // A drained worker is not held responsible for its batches.
-        if let Some(attached) = turn.state.workers.get_mut(&worker) {
-            attached.draining = true;
-        }
+        begin_draining(turn.state, worker);
         close(turn, worker, CloseReason::Draining);
     }
 }

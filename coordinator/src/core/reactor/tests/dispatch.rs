@@ -1,7 +1,7 @@
 //! Order of service and batch sizes.
 
 use super::*;
-use crate::core::reactor::dispatch::sizing::batch_size;
+use crate::core::reactor::dispatch::sizing::{batch_size, fleet_rate, measured};
 
 /// Checks the batch size for worker 1, with workers of `threads` measured at `rates` realizations
 /// per second, when `queued` realizations are left.
@@ -11,7 +11,8 @@ fn check_size(threads: &[u32], rates: &[Option<f64>], queued: u64, expected: u64
         worker.rates.clear();
         worker.rates.extend(rate.map(|rate| (JobId(1), rate)));
     }
-    let size = batch_size(&rig.state, &rig.state.workers[&WorkerId(1)], JobId(1), queued);
+    let fleet = measured(&rig.state, JobId(1));
+    let size = batch_size(&rig.state, &rig.state.workers[&WorkerId(1)], JobId(1), fleet, queued);
     assert_eq!(size, expected, "{threads:?} {rates:?} {queued}");
 }
 
@@ -27,6 +28,14 @@ fn batches_take_the_target_time_and_leave_work_for_the_others() {
     check_size(&[8], &[Some(8.0 / 0.3)], 10_000, 8);
     check_size(&[2], &[Some(0.1)], 10_000, 2);
     check_size(&[8, 8], &[Some(1.0), Some(1.0)], 6, 3);
+    // Many workers with little work: some of them get what keeps them busy longer than the batch costs.
+    let many = |queued, expected| check_size(&[16; 100], &[Some(16_000.0); 100], queued, expected);
+    many(2747, 67);
+    many(100, 13);
+    many(1, 1);
+    // With more work, a hundredth of a second and more; with much, a quarter of the share.
+    many(100_000, 320);
+    many(1_000_000, 2500);
     // Never more than a message may hold.
     check_size(&[2], &[Some(1e12)], 10_000_000, 65_536);
     // A quarter of the share of the remaining realizations; shares are proportional to the rates.
@@ -54,6 +63,19 @@ fn each_worker_holds_two_batches_and_no_more() {
     );
     // 8 in 0.04 s are 200 per second, 40 in 200 ms.
     rig.check(answer_in(0.04, 1, 1, 0, 8), &["send 1: batch 5 = 24+40"]);
+}
+
+/// The first answer of a job tells the rate of all, although nothing else has changed.
+#[test]
+fn the_rate_of_the_fleet_is_measured_when_the_first_worker_answers() {
+    let mut rig = Rig::with(100_000, &[2, 2]);
+    let unknown = fleet_rate(&mut rig.state, JobId(1));
+    assert_eq!((unknown.total, unknown.per_slot), (4.0, 1.0));
+    assert_eq!(fleet_rate(&mut rig.state, JobId(1)).total, 4.0);
+    // 8 realizations in 40 ms, by two threads.
+    rig.event(answer_in(0.04, 1, 1, 0, 8));
+    let known = fleet_rate(&mut rig.state, JobId(1));
+    assert_eq!((known.total, known.per_slot), (400.0, 100.0));
 }
 
 #[test]
