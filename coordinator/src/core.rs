@@ -23,5 +23,6 @@ pub mod sanity;
 pub(crate) mod service_order;
 pub(crate) mod snapshot;
 pub mod state;
+pub(crate) mod upkeep;
 pub(crate) mod worker_list;
 pub mod worker_name;

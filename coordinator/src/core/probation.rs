@@ -69,18 +69,21 @@ impl Probation {
         begins
     }
 
-    /// Puts a worker that attaches on probation if another process of its host is.
-    pub(crate) fn attach(&mut self, name: &WorkerName, now: Duration) {
+    /// Puts a worker that attaches on probation if another process of its host is, and returns whether
+    /// it does.
+    pub(crate) fn attach(&mut self, name: &WorkerName, now: Duration) -> bool {
         if self.0.is_empty() || self.0.len() >= WORKERS_MAX || self.has(name) {
-            return;
+            return false;
         }
         let first = WorkerName::new(name.host(), 0, 0);
         let mut of_host =
             self.0.range(first..).take_while(|(other, _)| other.host() == name.host());
-        if of_host.any(|(_, trial)| trial.missed > 0) {
+        let begins = of_host.any(|(_, trial)| trial.missed > 0);
+        if begins {
             let trial = ProbationRecord { missed: 0, rests_until: now, last: now };
             self.0.insert(name.clone(), trial);
         }
+        begins
     }
 
     /// Ends the probation of a worker that has answered a batch that it holds, and returns whether
@@ -134,8 +137,7 @@ mod tests {
         let [bad, same, other] = [("b", 7, 7), ("b", 1, 2), ("a", 9, 9)]
             .map(|(host, process, instance)| WorkerName::new(host, process, instance));
         probation.miss(&bad, s(0), s(0));
-        probation.attach(&same, s(1));
-        probation.attach(&other, s(1));
+        assert!(probation.attach(&same, s(1)) && !probation.attach(&other, s(1)));
         assert_eq!([&bad, &same, &other].map(|name| probation.has(name)), [true, true, false]);
         // It has missed nothing itself, and receives work at once.
         assert!(!probation.is_paused(&same, s(1)));

@@ -5,13 +5,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::core::batch::Purpose;
 use crate::core::ids::WorkerId;
-use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
 
-/// Place of a worker that can accept more; the smallest is served first.
+/// ServicePlace of a worker that can accept more; the smallest is served first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Place {
+pub(crate) struct ServicePlace {
     /// Workers on probation come last.
     pub(crate) on_probation: bool,
     /// Number of batches that it holds, without speculative ones.
@@ -25,20 +23,30 @@ pub(crate) struct Place {
 /// The workers that can accept more.
 #[derive(Debug, Default)]
 pub(crate) struct ServiceOrder {
-    places: BTreeMap<WorkerId, Place>,
-    order: BTreeSet<Place>,
+    places: BTreeMap<WorkerId, ServicePlace>,
+    order: BTreeSet<ServicePlace>,
 }
 
 impl ServiceOrder {
+    /// Returns the place of a worker.
+    pub(crate) fn place(&self, worker: WorkerId) -> Option<ServicePlace> {
+        self.places.get(&worker).copied()
+    }
+
+    /// Returns the workers with a place.
+    pub(crate) fn workers(&self) -> impl Iterator<Item = WorkerId> + '_ {
+        self.places.keys().copied()
+    }
+
     /// Returns the places in ascending order.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = Place> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = ServicePlace> + '_ {
         self.order.iter().copied()
     }
 
     /// Returns the workers that are not on probation and hold exactly this many batches, none of
     /// them speculative.
     pub(crate) fn holding(&self, batches: usize) -> impl Iterator<Item = WorkerId> + '_ {
-        let place = |worker| Place {
+        let place = |worker| ServicePlace {
             on_probation: false,
             held: batches,
             in_flight: batches,
@@ -48,7 +56,7 @@ impl ServiceOrder {
     }
 
     /// Gives a worker its place, or none.
-    fn put(&mut self, worker: WorkerId, place: Option<Place>) {
+    pub(crate) fn put(&mut self, worker: WorkerId, place: Option<ServicePlace>) {
         let before = match place {
             Some(place) => self.places.insert(worker, place),
             None => self.places.remove(&worker),
@@ -59,47 +67,5 @@ impl ServiceOrder {
             }
             self.order.extend(place);
         }
-    }
-}
-
-impl State {
-    /// Updates the place of a worker that has changed, come or gone.
-    pub(crate) fn reorder(&mut self, worker: WorkerId) {
-        let place = self.place(worker);
-        self.order.put(worker, place);
-    }
-
-    /// Updates the places of all workers.
-    pub(crate) fn reorder_all(&mut self) {
-        let workers: Vec<WorkerId> = self.workers.keys().copied().collect();
-        for worker in workers {
-            self.reorder(worker);
-        }
-    }
-
-    /// Returns a worker whose place is not the one that it should have, if there is one.
-    pub(crate) fn misplaced(&self) -> Option<WorkerId> {
-        let wrong =
-            |worker: &WorkerId| self.order.places.get(worker) != self.place(*worker).as_ref();
-        let listed = self.order.places.keys().chain(self.workers.keys()).find(|it| wrong(it));
-        let stray = || {
-            let known = |place: &&Place| self.order.places.get(&place.worker) != Some(*place);
-            self.order.order.iter().find(known).map(|place| place.worker)
-        };
-        listed.copied().or_else(stray)
-    }
-
-    /// Returns the place of a worker; `None` if it cannot accept more: it is gone, drains, computes a
-    /// quarantined realization, or holds as many batches as it may. One on probation must hold
-    /// nothing.
-    fn place(&self, id: WorkerId) -> Option<Place> {
-        let worker: &AttachedWorker = self.workers.get(&id)?;
-        let count = |purpose| self.held_for(worker, purpose).count();
-        let on_probation = self.probation.has(&worker.name);
-        let in_flight = worker.in_flight.len();
-        let held = in_flight - count(Purpose::Speculative);
-        let most = if on_probation { 1 } else { BATCHES_IN_FLIGHT_MAX };
-        let may = !worker.draining && held < most && count(Purpose::Exclusive) == 0;
-        may.then_some(Place { on_probation, held, in_flight, worker: id })
     }
 }

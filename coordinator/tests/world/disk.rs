@@ -38,7 +38,9 @@ impl World {
             Record::Evaluation { record, is_last } => {
                 let before = self.store.evaluation(record.job, record.number).unwrap();
                 if let Some(before) = before.filter(|before| before.workers != record.workers) {
-                    let same = before.outcomes == record.outcomes;
+                    // On another path of the search a point may differ in its last bits only, and have
+                    // the same outcomes.
+                    let same = before.point == record.point && before.outcomes == record.outcomes;
                     self.counts.replaced += u64::from(!same);
                     self.counts.confirmed += u64::from(same);
                     // The contents of a damaged record are unknown.

@@ -6,7 +6,7 @@ use super::{batches, eta};
 use crate::core::batch::Batch;
 use crate::core::ids::{BatchId, WorkerId};
 use crate::core::reactor::turn::Turn;
-use crate::core::service_order::Place;
+use crate::core::service_order::ServicePlace;
 use crate::core::state::State;
 
 /// A batch that has taken this many times its expected time is duplicated before anything is
@@ -20,7 +20,7 @@ pub(crate) fn duplicate_late_batches(turn: &mut Turn) {
     let late = |state: &State, batch: &Batch| {
         now.saturating_sub(batch.sent) >= LATE * eta::expected(state, batch)
     };
-    let idle = |place: &Place| place.held == 0;
+    let idle = |place: &ServicePlace| place.held == 0;
     duplicate(turn, idle, late);
 }
 
@@ -34,7 +34,7 @@ pub(crate) fn duplicate_slow_batches(turn: &mut Turn) {
 /// duplicated.
 fn duplicate(
     turn: &mut Turn,
-    idle: impl Fn(&Place) -> bool,
+    idle: impl Fn(&ServicePlace) -> bool,
     worth: impl Fn(&State, &Batch) -> bool,
 ) {
     let patience = turn.state.config.batch_target / 2;

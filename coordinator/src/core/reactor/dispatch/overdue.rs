@@ -370,7 +370,7 @@ pub(crate) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now:
 }
 
 /// Follows a change of the probations, which is rare.
-fn probation_changed(state: &mut State) {
+pub(crate) fn probation_changed(state: &mut State) {
     state.reorder_all();
     state.fleet_changes += 1;
 }

@@ -35,7 +35,10 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
     turn.state.next_lease += 1;
     let name = name(&hello);
     poison::forget_crashes(turn.state, &name);
-    turn.state.probation.attach(&name, turn.now);
+    if turn.state.probation.attach(&name, turn.now) {
+        // An earlier stay of the same worker may not have ended yet.
+        overdue::probation_changed(turn.state);
+    }
     turn.effects.push(Effect::Welcome { worker, lease });
     turn.effects.push(Effect::Note(Notice::WorkerAttached {
         worker,

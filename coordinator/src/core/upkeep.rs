@@ -1,0 +1,48 @@
+//! Keeps the order of service up to date: [`State::reorder`] follows every change of a worker that its
+//! place depends on.
+
+use crate::core::batch::Purpose;
+use crate::core::ids::WorkerId;
+use crate::core::service_order::ServicePlace;
+use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
+
+impl State {
+    /// Updates the place of a worker that has changed, come or gone.
+    pub(crate) fn reorder(&mut self, worker: WorkerId) {
+        let place = self.place(worker);
+        self.order.put(worker, place);
+    }
+
+    /// Updates the places of all workers.
+    pub(crate) fn reorder_all(&mut self) {
+        let workers: Vec<WorkerId> = self.workers.keys().copied().collect();
+        for worker in workers {
+            self.reorder(worker);
+        }
+    }
+
+    /// Returns a worker whose place is not the one that it should have, if there is one.
+    pub(crate) fn misplaced(&self) -> Option<WorkerId> {
+        let wrong = |worker: &WorkerId| self.order.place(*worker) != self.place(*worker);
+        let listed = self.order.workers().chain(self.workers.keys().copied()).find(wrong);
+        let stray = || {
+            let known = |place: &ServicePlace| self.order.place(place.worker) != Some(*place);
+            self.order.iter().find(known).map(|place| place.worker)
+        };
+        listed.or_else(stray)
+    }
+
+    /// Returns the place of a worker; `None` if it cannot accept more: it is gone, drains, computes a
+    /// quarantined realization, or holds as many batches as it may. One on probation must hold
+    /// nothing.
+    fn place(&self, id: WorkerId) -> Option<ServicePlace> {
+        let worker: &AttachedWorker = self.workers.get(&id)?;
+        let count = |purpose| self.held_for(worker, purpose).count();
+        let on_probation = self.probation.has(&worker.name);
+        let in_flight = worker.in_flight.len();
+        let held = in_flight - count(Purpose::Speculative);
+        let most = if on_probation { 1 } else { BATCHES_IN_FLIGHT_MAX };
+        let may = !worker.draining && held < most && count(Purpose::Exclusive) == 0;
+        may.then_some(ServicePlace { on_probation, held, in_flight, worker: id })
+    }
+}
