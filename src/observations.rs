@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use osteon_common::job::JobSpecification;
-use osteon_common::outcome::Outcome;
+use osteon_common::outcome::{FailureKind, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::settings::Extremum;
 use osteon_solver::{FirstSignal, Isa, ObservedRealization, Solver, Workspace};
@@ -26,7 +26,7 @@ pub(crate) struct Observations {
     rows: Vec<Observation>,
 }
 
-/// One realization. What is unknown is `None`; without a velocity everything else is.
+/// One realization. Without a velocity, the other observables are `None`, too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Observation {
     outcome: Outcome,
@@ -92,7 +92,7 @@ impl Observations {
 }
 
 impl Observation {
-    fn failed(kind: osteon_common::outcome::FailureKind) -> Self {
+    fn failed(kind: FailureKind) -> Self {
         Self { outcome: Err(kind), other_velocity: None, decay: None, center_frequency: None }
     }
 

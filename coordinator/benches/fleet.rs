@@ -42,7 +42,7 @@ struct Row {
     each: Duration,
 }
 
-/// What happens next in the simulated time.
+/// An occurrence of the simulation.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Next {
     Tick,
@@ -58,7 +58,7 @@ struct Fleet {
     now: Duration,
     queue: BinaryHeap<Reverse<(Duration, u64, Next)>>,
     numbers: u64,
-    /// What each worker holds, with the time when it will be computed.
+    /// Batches of each worker in the order they were sent, each with the time at which it ends.
     held: BTreeMap<u64, VecDeque<(Effect, Duration)>>,
     batches: u64,
     core: Duration,

@@ -110,7 +110,7 @@ impl Job {
 /// The rate of all workers at one job.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FleetRate {
-    /// Of all workers that are expected to answer, realizations per second.
+    /// Sum over the workers that are expected to answer, realizations per second.
     pub(crate) total: f64,
     /// Mean of one slot, realizations per second.
     pub(crate) per_slot: f64,
