@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::core::ids::WorkerId;
 
-/// ServicePlace of a worker that can accept more; the smallest is served first.
+/// Place of a worker that can accept more; the smallest is served first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct ServicePlace {
     /// Workers on probation come last.

@@ -81,7 +81,7 @@ pub struct State {
     pub(crate) batches: BTreeMap<BatchId, Batch>,
     /// The workers that can accept more.
     pub(crate) order: ServiceOrder,
-    /// Number of changes of the workers that share the work: attachments, departures, probations.
+    /// Number of changes of the workers that share the work: attachments, departures, drains, probations.
     pub(crate) fleet_changes: u64,
     /// Overdue batches that wait for a duplicate on another worker; of several duplicates only the
     /// newest is listed.

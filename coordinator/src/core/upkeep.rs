@@ -26,8 +26,8 @@ impl State {
         let wrong = |worker: &WorkerId| self.order.place(*worker) != self.place(*worker);
         let listed = self.order.workers().chain(self.workers.keys().copied()).find(wrong);
         let stray = || {
-            let known = |place: &ServicePlace| self.order.place(place.worker) != Some(*place);
-            self.order.iter().find(known).map(|place| place.worker)
+            let unknown = |place: &ServicePlace| self.order.place(place.worker) != Some(*place);
+            self.order.iter().find(unknown).map(|place| place.worker)
         };
         listed.or_else(stray)
     }

@@ -17,8 +17,8 @@ use crate::core::state::{AttachedWorker, State};
 /// enough to be answered soon.
 const FIRST_BATCH_PER_SLOT: u32 = 4;
 /// A batch holds at most this fraction (1 over the constant) of a worker's share of the remaining
-/// realizations. It may hold more to give each of the worker's slots one realization, but never
-/// more than the share.
+/// realizations. It may hold more to give each of the worker's slots one realization, up to the share,
+/// or to be worth its cost.
 const SHARE_DIVISOR: f64 = 4.0;
 /// Time that a batch costs the coordinator, s.
 const BATCH_COST_S: f64 = 1e-4;
