@@ -32,17 +32,22 @@ impl State {
         listed.or_else(stray)
     }
 
+    /// Returns the number of batches that a worker holds, without speculative ones.
+    pub(crate) fn held(&self, worker: &AttachedWorker) -> usize {
+        worker.in_flight.len() - self.held_for(worker, Purpose::Speculative).count()
+    }
+
     /// Returns the place of a worker; `None` if it cannot accept more: it is gone, drains, computes a
     /// quarantined realization, or holds as many batches as it may. One on probation must hold
     /// nothing.
     fn place(&self, id: WorkerId) -> Option<ServicePlace> {
         let worker: &AttachedWorker = self.workers.get(&id)?;
-        let count = |purpose| self.held_for(worker, purpose).count();
+        let is_exclusive = self.held_for(worker, Purpose::Exclusive).next().is_some();
         let on_probation = self.probation.has(&worker.name);
         let in_flight = worker.in_flight.len();
-        let held = in_flight - count(Purpose::Speculative);
+        let held = self.held(worker);
         let most = if on_probation { 1 } else { BATCHES_IN_FLIGHT_MAX };
-        let may = !worker.draining && held < most && count(Purpose::Exclusive) == 0;
+        let may = !worker.draining && held < most && !is_exclusive;
         may.then_some(ServicePlace { on_probation, held, in_flight, worker: id })
     }
 }

@@ -182,7 +182,7 @@ fn has_scout(state: &State, job: JobId, now: Duration) -> bool {
 }
 
 fn holds_anything(state: &State, worker: WorkerId) -> bool {
-    state.workers.get(&worker).is_none_or(|worker| schedule::held(state, worker) > 0)
+    state.workers.get(&worker).is_none_or(|worker| state.held(worker) > 0)
 }
 
 /// Chooses which of the workers in `free` gets a duplicate of a batch.
@@ -191,7 +191,7 @@ fn choose_worker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -
         let doubtful = worker.missed.count > 0 || !worker.has_answered;
         let on_probation = !state.is_sound(worker);
         let of_holder = is_of_holder(state, id, worker);
-        (on_probation, doubtful, of_holder, schedule::held(state, worker), *choose_worker)
+        (on_probation, doubtful, of_holder, state.held(worker), *choose_worker)
     };
     let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
     let fit = free.filter(|(worker, _)| is_fit(state, id, worker, now));
@@ -214,7 +214,7 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
             (
                 reputation,
                 is_of_holder(state, id, worker),
-                schedule::held(state, worker),
+                state.held(worker),
                 **choose_worker,
             )
         };

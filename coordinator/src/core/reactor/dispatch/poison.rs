@@ -40,7 +40,7 @@ pub(crate) fn dispatch(turn: &mut Turn) -> BTreeSet<WorkerId> {
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
     for job in active {
         while let Some((index, worker)) = next(turn.state, job, turn.now) {
-            let holds = |worker: &AttachedWorker| schedule::held(turn.state, worker) > 0;
+            let holds = |worker: &AttachedWorker| turn.state.held(worker) > 0;
             if turn.state.workers.get(&worker).is_none_or(holds) {
                 kept.insert(worker);
                 break;
@@ -69,7 +69,7 @@ fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
 /// that has not answered anything yet must first answer other work, if there is any.
 fn choose_worker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
     let rank = |(id, worker): &(&WorkerId, &AttachedWorker)| {
-        let held = if crashes.is_empty() { schedule::held(state, worker) } else { 0 };
+        let held = if crashes.is_empty() { state.held(worker) } else { 0 };
         (reputation(state, worker, crashes), held, **id)
     };
     let takers = state.workers.iter().filter(|(_, worker)| !worker.draining);

@@ -3,10 +3,9 @@
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
-use crate::core::batch::Purpose;
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::Job;
-use crate::core::state::{AttachedWorker, State};
+use crate::core::state::State;
 use crate::store::JobRecord;
 
 /// Returns whether anything besides quarantined realizations waits to be sent.
@@ -20,11 +19,6 @@ pub(crate) fn free_workers<'a>(
     kept: &'a BTreeSet<WorkerId>,
 ) -> impl Iterator<Item = WorkerId> + 'a {
     state.order.iter().map(|place| place.worker).filter(|worker| !kept.contains(worker))
-}
-
-/// Returns the number of batches that a worker holds, without speculative ones.
-pub(crate) fn held(state: &State, worker: &AttachedWorker) -> usize {
-    worker.in_flight.len() - state.held_for(worker, Purpose::Speculative).count()
 }
 
 /// Chooses the job that is served next, among the active jobs with work. The client with the least
