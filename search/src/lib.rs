@@ -18,4 +18,4 @@ pub mod simplex;
 
 pub use expected::ExpectedEvaluations;
 pub use identify::{CompletedJob, IdentifyError, Realizations, identify};
-pub use search::{Ending, ReplayError, Search, Step, Summary, same_point};
+pub use search::{Assessment, Branch, Ending, ReplayError, Search, Step, Summary, same_point};

@@ -24,9 +24,11 @@ use thiserror::Error;
 use self::identification::IdentificationSearch;
 use crate::posterior::posterior;
 
+pub use self::branch::Branch;
 pub use self::candidates::same_point;
 
 mod advice;
+mod branch;
 mod candidates;
 mod dataset_search;
 mod identification;
@@ -113,9 +115,11 @@ pub struct Search {
     assessment: Option<Assessment>,
 }
 
-/// Assessment of a point, computed from its outcomes.
+/// Moments and cost of a point, computed from its outcomes.
 #[derive(Debug, Clone)]
-struct Assessment {
+pub struct Assessment {
+    /// Number of the set of data that the cost is for.
+    set: u32,
     outcomes: Arc<[Outcome]>,
     statistics: PointStatistics,
     /// `None` for a propagation.
@@ -202,7 +206,7 @@ impl Search {
             return;
         };
         let assessment = match self.assessment.take() {
-            Some(assessment) if Arc::ptr_eq(&assessment.outcomes, &outcomes) => assessment,
+            Some(known) if known.is_of(self.set(), &outcomes) => known,
             _ => self.assess(&point, &outcomes),
         };
         let mut row = Evaluation { estimated_error, ..self.row(point, &assessment) };
@@ -233,7 +237,15 @@ impl Search {
             }
             SearchPlan::Propagation { .. } => None,
         };
-        Assessment { outcomes: Arc::clone(outcomes), statistics, cost }
+        Assessment { set: self.set(), outcomes: Arc::clone(outcomes), statistics, cost }
+    }
+
+    /// Returns the number of the set of data that the pending point is for.
+    fn set(&self) -> u32 {
+        match &self.plan {
+            SearchPlan::Identification(identification) => identification.present().set(),
+            SearchPlan::Propagation { .. } => 0,
+        }
     }
 
     /// Returns the history row of the pending point with everything but its role and estimated
@@ -321,6 +333,13 @@ impl Search {
         let reason = self.history.first();
         let reason = reason.map(|row| reasons::failed(row, &self.specification));
         Ending::from_search(Status::Failed, Some(reason.unwrap_or_default()))
+    }
+}
+
+impl Assessment {
+    /// Returns whether it is that of these very outcomes, for this set of data.
+    fn is_of(&self, set: u32, outcomes: &Arc<[Outcome]>) -> bool {
+        self.set == set && Arc::ptr_eq(&self.outcomes, outcomes)
     }
 }
 

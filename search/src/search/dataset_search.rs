@@ -35,6 +35,8 @@ pub(super) struct DatasetSearch {
     weights: Option<MomentWeights>,
     /// Number of the current start.
     start: u32,
+    /// The search ends with this start, without derivatives and posterior.
+    is_of_one_start: bool,
     space: SearchBox,
     method: MethodState,
     /// Number of points evaluated for this set, and the first of them.
@@ -65,22 +67,43 @@ struct Best {
 impl DatasetSearch {
     /// Creates the search for set number `set` of the data.
     pub(super) fn new(specification: &JobSpecification, set: usize) -> Self {
+        let tolerance = specification.search.cost_tolerance;
+        Self::from_start(specification, set, (0, false), tolerance)
+    }
+
+    /// Creates the search for a set from one of several starts alone, which ends at a cost of at most
+    /// `tolerance`.
+    pub(super) fn of_one_start(
+        specification: &JobSpecification,
+        set: usize,
+        start: u32,
+        tolerance: f64,
+    ) -> Self {
+        Self::from_start(specification, set, (start, true), tolerance)
+    }
+
+    fn from_start(
+        specification: &JobSpecification,
+        set: usize,
+        (start, is_of_one_start): (u32, bool),
+        tolerance: f64,
+    ) -> Self {
         let given = specification.data.as_ref();
         let data = given.map_or(Moments::UNKNOWN, |given| given.moments(set));
-        let space = space_of_start(specification, set, 0);
+        let space = space_of_start(specification, set, start);
         let weighted = given.filter(|_| specification.objective == Objective::ChiSquare);
         let weights = weighted.and_then(|given| MomentWeights::of_data(given, set));
         let measured = measured(specification, set);
-        let tolerance = specification.search.cost_tolerance;
         let method = MethodState::new(specification, data, measured, weights, space, tolerance);
         let mut search = Self {
             // A job has at most a thousand sets.
             set: u32::try_from(set).unwrap_or(u32::MAX),
             data,
             weights,
-            start: 0,
+            start,
+            is_of_one_start,
             space,
-            method: method_of_start(specification, 0, method),
+            method: method_of_start(specification, start, method),
             evaluations: 0,
             first: None,
             best: None,
@@ -96,6 +119,16 @@ impl DatasetSearch {
             None => search.settle(specification),
         }
         search
+    }
+
+    /// Returns the number of the set.
+    pub(super) fn set(&self) -> u32 {
+        self.set
+    }
+
+    /// Returns the number of the current start; that of the last one plus one if none is left.
+    pub(super) fn start(&self) -> u32 {
+        self.start
     }
 
     /// Returns the next point, unless the search has ended.
@@ -267,6 +300,10 @@ impl DatasetSearch {
 
     /// Starts the search from the next start; after the last start, the derivatives or the end.
     fn stopped(&mut self, specification: &JobSpecification, stop: StopReason) {
+        if self.is_of_one_start {
+            self.stop = Some(stop);
+            return self.end(specification);
+        }
         if u64::from(self.start) == specification.search.starts {
             return self.begin_posterior(specification);
         }
@@ -292,8 +329,8 @@ impl DatasetSearch {
         }
     }
 
-    /// Returns the cost at which the search from the current start ends.
-    fn tolerance(&self, specification: &JobSpecification) -> f64 {
+    /// Returns the cost at which a further start ends, by what is known so far.
+    pub(super) fn tolerance(&self, specification: &JobSpecification) -> f64 {
         let given = specification.search.cost_tolerance;
         let is_answered =
             self.best().and_then(|best| best.cost).is_some_and(|lowest| lowest <= given);

@@ -65,6 +65,11 @@ impl IdentificationSearch {
         row
     }
 
+    /// Returns the search for the current set.
+    pub(super) fn present(&self) -> &DatasetSearch {
+        &self.present
+    }
+
     /// Returns the best evaluation of the current set.
     pub(super) fn best(&self) -> Option<&Evaluation> {
         self.present.best()

@@ -13,6 +13,7 @@ use osteon_common::results::Moments;
 use super::*;
 
 mod advice;
+mod branch;
 mod chi_square;
 mod likelihood;
 mod reasons;
