@@ -29,6 +29,9 @@ pub struct Config {
     pub audit_fraction: f64,
     /// Decides which batches are audited; a running coordinator draws its own key.
     pub audit_key: AuditKey,
+    /// Whether groups and starts that a search has not come to are computed at the same time as those
+    /// before them.
+    pub ahead: bool,
     /// Whether otherwise idle slots compute candidate points of searches speculatively.
     pub speculation: bool,
     /// Ended jobs are deleted after this long; `None`: only when a client requests it.
@@ -67,6 +70,7 @@ impl Default for Config {
             batch_target: Duration::from_millis(200),
             audit_fraction: AUDIT_FRACTION,
             audit_key: AuditKey::default(),
+            ahead: true,
             speculation: true,
             keep_ended: None,
             tick: Duration::from_millis(100),

@@ -1,6 +1,7 @@
 //! The pure state machine of a coordinator: jobs, searches, batches and leases. It is given events
 //! and the time, and returns effects; it knows no clock, no socket and no future.
 
+pub(crate) mod ahead;
 pub mod audit;
 pub(crate) mod batch;
 pub mod close_reason;

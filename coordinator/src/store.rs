@@ -207,6 +207,15 @@ pub trait Store {
         is_last: bool,
     ) -> Result<(), StoreError>;
 
+    /// Makes evaluations of a job with consecutive numbers durable, and deletes all evaluations after
+    /// them.
+    ///
+    /// # Errors
+    /// When that is not durable. Some of them may be.
+    fn put_evaluations(&mut self, records: &[EvaluationRecord]) -> Result<(), StoreError> {
+        records.iter().try_for_each(|record| self.put_evaluation(record, true))
+    }
+
     /// Makes the end of a job and the summary of its search durable, both in one transaction.
     ///
     /// # Errors

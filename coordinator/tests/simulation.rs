@@ -56,7 +56,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             assert!(count > SCHEDULES / 4, "{name}: {count}");
         }
         let world::Counts { stops, cancelled, outages, banned, pruned, lies, .. } = seen;
-        let world::Counts { bad_deaths, pauses, damaged, .. } = seen;
+        let world::Counts { bad_deaths, pauses, damaged, prepared, .. } = seen;
         for (name, count) in [
             ("clean stops", stops),
             ("jobs cancelled", cancelled),
@@ -67,6 +67,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             ("deaths on a bad node", bad_deaths),
             ("pauses of the coordinator", pauses),
             ("damaged evaluations", damaged),
+            ("evaluations complete before their search asked for them", prepared),
         ] {
             assert!(count > SCHEDULES / 20, "{name}: {count}");
         }

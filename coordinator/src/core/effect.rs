@@ -111,6 +111,9 @@ pub enum Record {
         /// Delete the evaluations stored after it: they belong to another path of the search.
         is_last: bool,
     },
+    /// Complete evaluations of a job with consecutive numbers, at least one. Evaluations stored after
+    /// them are deleted.
+    Evaluations(Vec<EvaluationRecord>),
     /// The end of a job.
     End {
         /// The end.
@@ -128,6 +131,12 @@ impl Record {
         match self {
             Self::Job(record) => (record.job, RecordKey::Job),
             Self::Evaluation { record, .. } => (record.job, RecordKey::Evaluation(record.number)),
+            Self::Evaluations(records) => {
+                let last = records.last().map(|last| (last.job, last.number));
+                // There is at least one.
+                let (job, number) = last.unwrap_or((JobId(0), 0));
+                (job, RecordKey::Evaluation(number))
+            }
             Self::End { end, .. } => (end.job, RecordKey::End),
             Self::Ban(record) => (record.job, RecordKey::Ban(record.number)),
         }

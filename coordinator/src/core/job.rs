@@ -8,6 +8,7 @@ use osteon_common::parameters::Point;
 use osteon_proto::specification;
 use prost::Message as _;
 
+use crate::core::ahead::Ahead;
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{BatchId, ReplyId};
 use crate::core::rate::Rate;
@@ -24,6 +25,8 @@ pub(crate) struct Job {
     pub(crate) identity: SpecificationDigest,
     pub(crate) stage: Stage,
     pub(crate) search: Search,
+    /// Evaluations of points that its search will ask for when it comes to other groups and starts.
+    pub(crate) ahead: Ahead,
     /// Speculative evaluations of points that its search may ask for next.
     pub(crate) speculation: Speculation,
     /// Number of its evaluations in the store. Those that the search has not received yet are read
@@ -64,6 +67,7 @@ impl Job {
         Self {
             identity: identity(&record.specification),
             search: Search::new(record.specification.clone()),
+            ahead: Ahead::default(),
             speculation: Speculation::default(),
             record,
             stage,
@@ -94,7 +98,21 @@ impl Job {
 
     /// Returns all evaluations under way; the one that the search asked for comes first.
     pub(crate) fn evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
-        self.evaluation().into_iter().chain(&self.speculation.evaluations)
+        self.certain().chain(&self.speculation.evaluations)
+    }
+
+    /// Returns the evaluation that the search asked for, and those that it will ask for.
+    pub(crate) fn certain(&self) -> impl Iterator<Item = &PendingEvaluation> {
+        self.evaluation().into_iter().chain(self.ahead.evaluations())
+    }
+
+    /// As [`Job::certain`].
+    pub(crate) fn certain_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
+        let asked_for = match &mut self.stage {
+            Stage::Computing(evaluation) => Some(evaluation),
+            _ => None,
+        };
+        asked_for.into_iter().chain(self.ahead.evaluations_mut())
     }
 
     /// As [`Job::evaluations`].
@@ -103,7 +121,8 @@ impl Job {
             Stage::Computing(evaluation) => Some(evaluation),
             _ => None,
         };
-        asked_for.into_iter().chain(&mut self.speculation.evaluations)
+        let ahead = self.ahead.evaluations_mut();
+        asked_for.into_iter().chain(ahead).chain(&mut self.speculation.evaluations)
     }
 }
 
@@ -143,6 +162,13 @@ pub(crate) enum Stage {
         /// Evaluations stored after it belong to another path of the search and are deleted.
         is_last: bool,
     },
+    /// Evaluations that were complete before the search asked for them are being stored.
+    StoringPrepared {
+        /// The evaluations, with consecutive numbers; not empty.
+        records: Vec<EvaluationRecord>,
+        /// The search after them.
+        after: Box<Search>,
+    },
     /// Its end is being stored.
     StoringEnd(EndRecord),
 }
@@ -152,7 +178,10 @@ impl Stage {
     pub(crate) fn is_storing(&self) -> bool {
         matches!(
             self,
-            Self::StoringSubmission | Self::StoringEvaluation { .. } | Self::StoringEnd(_)
+            Self::StoringSubmission
+                | Self::StoringEvaluation { .. }
+                | Self::StoringPrepared { .. }
+                | Self::StoringEnd(_)
         )
     }
 }

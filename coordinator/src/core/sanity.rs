@@ -3,8 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use osteon_common::parameters::Point;
+use osteon_search::same_point;
 use thiserror::Error;
 
+use crate::core::ahead::{Ahead, FollowedBranch};
 use crate::core::batch::{Batch, Purpose};
 use crate::core::dispute::Dispute;
 use crate::core::evaluation::PendingEvaluation;
@@ -65,6 +67,9 @@ pub enum Inconsistency {
     /// A speculative evaluation is not of one of the candidate points.
     #[error("job {0} has a speculative evaluation that is not a candidate of its search")]
     Speculation(JobId),
+    /// An evaluation ahead of a search is of a part that it has passed, or of a wrong point.
+    #[error("job {0} has an evaluation ahead of its search that the search will not ask for")]
+    Ahead(JobId),
     /// A worker does not have the place that it should have in the order of service.
     #[error("worker {0} has a wrong place in the order of service")]
     Order(WorkerId),
@@ -90,6 +95,7 @@ pub fn sanity_check(state: &State) -> Result<(), Inconsistency> {
             check_checks(state, id, evaluation)?;
         }
         check_speculation(job)?;
+        check_ahead(state, job)?;
     }
     let jobs = state.jobs.last_key_value().is_some_and(|(last, _)| last.0 >= state.next_job);
     let batches = state.batches.last_key_value();
@@ -104,9 +110,10 @@ fn check_jobs(state: &State) -> Result<(), Inconsistency> {
         let active = state.active.contains(&id);
         let fits = match &job.stage {
             Stage::Waiting => waiting == 1 && !active,
-            Stage::Replaying { .. } | Stage::Computing(_) | Stage::StoringEvaluation { .. } => {
-                waiting == 0 && active
-            }
+            Stage::Replaying { .. }
+            | Stage::Computing(_)
+            | Stage::StoringEvaluation { .. }
+            | Stage::StoringPrepared { .. } => waiting == 0 && active,
             Stage::StoringSubmission | Stage::StoringEnd(_) => waiting == 0 && !active,
         };
         if !fits || state.ended.contains_key(&id) {
@@ -142,7 +149,7 @@ fn check_jobs(state: &State) -> Result<(), Inconsistency> {
 /// is under way.
 fn check_speculation(job: &Job) -> Result<(), Inconsistency> {
     let Speculation { candidates, evaluations } = &job.speculation;
-    let under_way = matches!(job.stage, Stage::Computing(_) | Stage::StoringEvaluation { .. });
+    let under_way = is_under_way(job);
     let bits = |point: &Point| point.0.map(f64::to_bits);
     let points: BTreeSet<_> = job.evaluations().map(|it| bits(&it.point)).collect();
     let known = |of: &PendingEvaluation| candidates.iter().any(|at| bits(at) == bits(&of.point));
@@ -152,6 +159,36 @@ fn check_speculation(job: &Job) -> Result<(), Inconsistency> {
         && (under_way || candidates.is_empty())
         && evaluations.iter().all(|it| it.audits_out == 0);
     if fits { Ok(()) } else { Err(Inconsistency::Speculation(job.record.job)) }
+}
+
+/// Checks that what is computed ahead of a search belongs to parts that it has not passed, is
+/// evaluated once, and that something of it waits to be sent if there is room for more.
+fn check_ahead(state: &State, job: &Job) -> Result<(), Inconsistency> {
+    let Ahead { branches, .. } = &job.ahead;
+    let part = job.search.part();
+    let mut parts = branches.iter().map(|it| it.part);
+    let at_its_point = |it: &FollowedBranch| {
+        let point = it.branch.point();
+        it.evaluation.as_ref().is_none_or(|evaluation| {
+            point.is_some_and(|point| same_point(&point, &evaluation.point))
+        })
+    };
+    let banned = state.banned.iter().map(|banned| &banned.record.worker);
+    let mut prepared = job.ahead.all_prepared();
+    let fits = parts.clone().is_sorted()
+        && parts.all(|of| of >= part && of < job.ahead.next_part)
+        && branches.iter().all(at_its_point)
+        && (is_under_way(job) || job.ahead.evaluations().next().is_none())
+        && prepared.all(|it| banned.clone().all(|name| !it.workers.contains(name)));
+    if fits { Ok(()) } else { Err(Inconsistency::Ahead(job.record.job)) }
+}
+
+/// Returns whether the evaluations of a job are computed or stored.
+fn is_under_way(job: &Job) -> bool {
+    matches!(
+        job.stage,
+        Stage::Computing(_) | Stage::StoringEvaluation { .. } | Stage::StoringPrepared { .. }
+    )
 }
 
 /// Returns whether a batch belongs to this evaluation.
@@ -246,7 +283,7 @@ fn check_batches(state: &State) -> Result<(), Inconsistency> {
         }
         let attempt = batch.assignment.attempt;
         let job = state.jobs.get(&batch.assignment.job);
-        let asked_for = job.and_then(Job::evaluation).is_some_and(|it| it.attempt == attempt);
+        let asked_for = job.is_some_and(|job| job.certain().any(|it| it.attempt == attempt));
         let speculative = job
             .is_some_and(|job| job.speculation.evaluations.iter().any(|it| it.attempt == attempt));
         if asked_for == speculative || (batch.purpose == Purpose::Speculative) != speculative {

@@ -46,7 +46,9 @@ pub(crate) fn job_snapshot(state: &State, id: JobId, now: Duration) -> Option<Jo
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = evaluation.filled();
         }
-        Stage::StoringEvaluation { .. } | Stage::StoringEnd(_) => {
+        Stage::StoringEvaluation { .. }
+        | Stage::StoringPrepared { .. }
+        | Stage::StoringEnd(_) => {
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = realizations;
         }
@@ -162,6 +164,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
         Stage::StoringSubmission
         | Stage::Computing(_)
         | Stage::StoringEvaluation { .. }
+        | Stage::StoringPrepared { .. }
         | Stage::StoringEnd(_) => String::new(),
     }
 }

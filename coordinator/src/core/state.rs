@@ -210,6 +210,18 @@ impl State {
         self.jobs.len()
     }
 
+    /// Returns the number of realizations in the evaluations of all active jobs, with speculative ones
+    /// and those ahead of their searches.
+    pub(crate) fn realizations(&self) -> u64 {
+        let of_job = |id: &JobId| {
+            let job = self.jobs.get(id)?;
+            let each = job.record.specification.monte_carlo.realizations;
+            let further = job.speculation.evaluations.len() + job.ahead.count();
+            Some(each * (1 + further as u64))
+        };
+        self.active.iter().filter_map(of_job).sum()
+    }
+
     /// Returns the number of records on their way to the store.
     pub(crate) fn unstored(&self) -> usize {
         let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;

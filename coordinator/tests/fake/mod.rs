@@ -110,6 +110,7 @@ pub(crate) fn written(store: &mut dyn Store, record: &Record) -> Event {
     match record {
         Record::Job(record) => store.put_job(record),
         Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
+        Record::Evaluations(records) => store.put_evaluations(records),
         Record::End { end, summary } => store.finish_job(end, summary),
         Record::Ban(record) => store.put_ban(record),
     }

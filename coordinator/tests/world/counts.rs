@@ -33,6 +33,8 @@ pub(crate) struct Counts {
     pub(crate) remembered: u64,
     /// Jobs that ended correctly although there were wrong answers in them.
     pub(crate) repaired: u64,
+    /// Evaluations of other groups and starts that were complete when their search asked for them.
+    pub(crate) prepared: u64,
     /// Points on the path of a search that were computed speculatively.
     pub(crate) ahead: u64,
     /// Points that were computed speculatively and are not on the path of their search.
@@ -70,6 +72,7 @@ impl Counts {
         self.confirmed += other.confirmed;
         self.remembered += other.remembered;
         self.repaired += other.repaired;
+        self.prepared += other.prepared;
         self.ahead += other.ahead;
         self.dropped += other.dropped;
         self.pruned += other.pruned;

@@ -3,7 +3,7 @@
 use osteon_coordinator::core::effect::Record;
 use osteon_coordinator::core::event::{Event, ReadFailure, Request, Retention};
 use osteon_coordinator::core::ids::{JobId, ReplyId};
-use osteon_coordinator::store::Store as _;
+use osteon_coordinator::store::{EvaluationRecord, Store as _};
 
 use super::{Occurrence, World};
 use crate::fake;
@@ -35,20 +35,26 @@ impl World {
                     self.deceived.remove(&end.job);
                 }
             }
-            Record::Evaluation { record, is_last } => {
-                let before = self.store.evaluation(record.job, record.number).unwrap();
-                if let Some(before) = before.filter(|before| before.workers != record.workers) {
-                    // On another path of the search a point may differ in its last bits only, and have
-                    // the same outcomes.
-                    let same = before.point == record.point && before.outcomes == record.outcomes;
-                    self.counts.replaced += u64::from(!same);
-                    self.counts.confirmed += u64::from(same);
-                    // The contents of a damaged record are unknown.
-                    let damaged = self.damaged.contains(&(record.job, record.number));
-                    assert!(damaged || *is_last != same, "{record:?}");
-                }
+            Record::Evaluation { record, is_last } => self.look_at_evaluation(record, *is_last),
+            Record::Evaluations(records) => {
+                self.counts.prepared += records.len() as u64;
+                records.iter().for_each(|record| self.look_at_evaluation(record, true));
             }
             Record::Job(_) => {}
+        }
+    }
+
+    fn look_at_evaluation(&mut self, record: &EvaluationRecord, is_last: bool) {
+        let before = self.store.evaluation(record.job, record.number).unwrap();
+        if let Some(before) = before.filter(|before| before.workers != record.workers) {
+            // On another path of the search a point may differ in its last bits only, and have
+            // the same outcomes.
+            let same = before.point == record.point && before.outcomes == record.outcomes;
+            self.counts.replaced += u64::from(!same);
+            self.counts.confirmed += u64::from(same);
+            // The contents of a damaged record are unknown.
+            let damaged = self.damaged.contains(&(record.job, record.number));
+            assert!(damaged || is_last != same, "{record:?}");
         }
     }
 
@@ -65,13 +71,9 @@ impl World {
     /// Handles a record that has become durable.
     pub(super) fn written(&mut self, record: &Record) -> Event {
         match record {
-            Record::Evaluation { record, is_last } => {
-                self.damaged.remove(&(record.job, record.number));
-                if let Some(seed) = self.seeds.get(&record.job) {
-                    let durable = self.durable.entry(*seed).or_default();
-                    let before = if *is_last { 0 } else { *durable };
-                    *durable = before.max(record.number + 1);
-                }
+            Record::Evaluation { record, is_last } => self.note_durable(record, *is_last),
+            Record::Evaluations(records) => {
+                records.iter().for_each(|record| self.note_durable(record, true));
             }
             Record::Job(record) => {
                 self.seeds.insert(record.job, record.specification.monte_carlo.seed);
@@ -79,6 +81,15 @@ impl World {
             Record::End { .. } | Record::Ban(_) => {}
         }
         fake::written(&mut self.store, record)
+    }
+
+    fn note_durable(&mut self, record: &EvaluationRecord, is_last: bool) {
+        self.damaged.remove(&(record.job, record.number));
+        if let Some(seed) = self.seeds.get(&record.job) {
+            let durable = self.durable.entry(*seed).or_default();
+            let before = if is_last { 0 } else { *durable };
+            *durable = before.max(record.number + 1);
+        }
     }
 
     pub(super) fn read(&mut self, job: JobId, number: u64) {

@@ -166,6 +166,7 @@ impl World {
             batch_target: Duration::from_millis(10 + draw(200)),
             store_retry: Duration::from_millis(300),
             audit_fraction: [0.0, 0.01, 0.3, 1.0][draw(4) as usize],
+            ahead: draw(4) > 0,
             speculation: draw(3) > 0,
             ..Config::default()
         };

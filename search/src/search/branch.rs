@@ -14,7 +14,7 @@ use osteon_common::results::{Evaluation, EvaluationRole};
 use osteon_common::statistics::PointStatistics;
 
 use super::dataset_search::DatasetSearch;
-use super::{Assessment, Search, SearchPlan};
+use super::{Assessment, Search, SearchPlan, same_point};
 
 /// A part of a search, followed by itself: the search for one set of data, or, if there are several
 /// starts, from one of them. With several starts it holds no derivatives and no posterior, which
@@ -76,6 +76,16 @@ impl Search {
         Some(Branch { specification, search, evaluations: 0 })
     }
 
+    /// Returns whether part number `part` begins at `point`, and another after it, too: the searches for
+    /// all sets begin at the same points, unless something is known of each set.
+    pub fn shares_start(&self, part: u64, point: &Point) -> bool {
+        let begins_there = |part| {
+            let first = self.branch(part).and_then(|branch| branch.point());
+            first.is_some_and(|first| same_point(&first, point))
+        };
+        begins_there(part + self.starts()) && begins_there(part)
+    }
+
     /// Saves computing the assessment of these outcomes again when they are passed to
     /// [`Search::tell`] next. It is ignored if they are not.
     pub fn anticipate(&mut self, assessment: Assessment) {
@@ -89,6 +99,11 @@ impl Search {
 }
 
 impl Branch {
+    /// Returns the number of points whose outcomes it was given.
+    pub fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
     /// Returns the next point, unless it has ended.
     pub fn point(&self) -> Option<Point> {
         self.search.point()

@@ -20,6 +20,7 @@ use crate::core::ids::WorkerId;
 use crate::core::job::Job;
 use crate::core::reactor::turn::Turn;
 
+pub(super) mod ahead;
 mod audits;
 pub(super) mod batches;
 pub(super) mod departures;
@@ -69,19 +70,19 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     let Some(job) = schedule::next_job(turn.state) else {
         return false;
     };
-    let Some(evaluation) = turn.state.jobs.get(&job).and_then(Job::evaluation) else {
+    let Some((attempt, queued)) = turn.state.jobs.get(&job).and_then(next_evaluation) else {
         return false;
     };
     let Some(attached) = turn.state.workers.get(&worker) else {
         return false;
     };
-    let queued = evaluation.queued();
     let size = if turn.state.is_sound(attached) {
         let fleet = sizing::fleet_rate(turn.state, job);
         let Some(attached) = turn.state.workers.get(&worker) else {
             return false;
         };
-        sizing::batch_size(turn.state, attached, job, fleet, queued)
+        let further = turn.state.jobs.get(&job).map_or(0, ahead::left);
+        sizing::batch_size(turn.state, attached, job, fleet, (queued, further))
     } else if !turn.state.probation.is_paused(&attached.name, turn.now)
         || !turn.state.answers_batches(|_| true)
     {
@@ -89,18 +90,26 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     } else {
         return false;
     };
-    let Some(evaluation) = turn.state.evaluation_mut(job) else {
-        return false;
-    };
-    let attempt = evaluation.attempt;
-    let Some(indices) = evaluation.take(size) else {
+    let found = turn.state.jobs.get_mut(&job).and_then(|job| {
+        let mut evaluations = job.certain_mut();
+        evaluations.find(|it| it.attempt == attempt)?.take(size)
+    });
+    let Some(indices) = found else {
         return false;
     };
     turn.state.last_served = Some(job);
+    ahead::refresh(turn.state, job);
     let assignment = Assignment { job, attempt, indices };
     let batch = batches::send(turn, worker, assignment, Purpose::Fill);
     if let Some(batch) = batch {
         batches::charge(turn.state, batch);
     }
     true
+}
+
+/// Returns the attempt at the evaluation of a job whose realizations are sent next, with the number of
+/// those that wait: the one that the search asked for comes first.
+fn next_evaluation(job: &Job) -> Option<(u64, u64)> {
+    let evaluation = job.certain().find(|evaluation| !evaluation.queue.is_empty())?;
+    Some((evaluation.attempt, evaluation.queued()))
 }

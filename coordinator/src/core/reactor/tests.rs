@@ -219,6 +219,10 @@ fn described(effect: &Effect) -> String {
         Effect::Store(Record::Evaluation { record, .. }) => {
             format!("store job {} evaluation {}", record.job, record.number)
         }
+        Effect::Store(Record::Evaluations(records)) => {
+            let numbers: Vec<String> = records.iter().map(|it| it.number.to_string()).collect();
+            format!("store job {} evaluations {}", records[0].job, numbers.join(" "))
+        }
         Effect::Store(Record::Ban(record)) => {
             format!("store ban {}: {} {}", record.number, record.worker, record.reason)
         }

@@ -7,6 +7,7 @@ use crate::core::evaluation::Audit;
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, State};
+use crate::core::worker_name::WorkerName;
 
 /// Sends a worker a tie-breaker or an audit that it is eligible for, if there is one; disputes come
 /// first.
@@ -23,14 +24,7 @@ pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
         if on_probation {
             continue;
         }
-        let Some(evaluation) = turn.state.evaluation_mut(job) else {
-            continue;
-        };
-        let attempt = evaluation.attempt;
-        let of_others = |audit: &Audit| audit.by != name;
-        let at = evaluation.audits.iter().position(of_others);
-        if let Some(audit) = at.and_then(|at| evaluation.audits.remove(at)) {
-            evaluation.audits_out += 1;
+        if let Some((audit, attempt)) = audit_for(turn.state, job, &name) {
             let assignment = Assignment { job, attempt, indices: audit.indices };
             let purpose = Purpose::Audit { lost: audit.lost };
             batches::send(turn, worker, assignment, purpose);
@@ -38,6 +32,19 @@ pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
         }
     }
     false
+}
+
+/// Takes the first audit of a job's evaluations that this worker may compute; returns it with the
+/// attempt at the evaluation.
+fn audit_for(state: &mut State, job: JobId, name: &WorkerName) -> Option<(Audit, u64)> {
+    let of_others = |audit: &Audit| audit.by != *name;
+    let mut evaluations = state.jobs.get_mut(&job)?.certain_mut();
+    evaluations.find_map(|evaluation| {
+        let at = evaluation.audits.iter().position(of_others)?;
+        let audit = evaluation.audits.remove(at)?;
+        evaluation.audits_out += 1;
+        Some((audit, evaluation.attempt))
+    })
 }
 
 /// Returns the first dispute of a job that this worker shall decide: one for which no eligible

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::departures;
+use crate::core::ahead::Ahead;
 use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::crashes::{Cause, LostWorker};
 use crate::core::effect::Effect;
@@ -73,7 +74,7 @@ pub(crate) fn revoke(turn: &mut Turn, batch: BatchId) {
     }
 }
 
-/// Revokes every batch of a job, and drops its speculative evaluations.
+/// Revokes every batch of a job, and drops all evaluations that its search has not asked for.
 pub(crate) fn revoke_all(turn: &mut Turn, job: JobId) {
     let of_job = turn.state.batches.iter().filter(|(_, batch)| batch.assignment.job == job);
     let batches: Vec<BatchId> = of_job.map(|(id, _)| *id).collect();
@@ -82,6 +83,7 @@ pub(crate) fn revoke_all(turn: &mut Turn, job: JobId) {
     }
     if let Some(job) = turn.state.jobs.get_mut(&job) {
         job.speculation = Speculation::default();
+        job.ahead = Ahead::default();
     }
 }
 

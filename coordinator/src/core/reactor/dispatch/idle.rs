@@ -11,7 +11,6 @@ use std::time::Duration;
 use osteon_common::job::JobKind;
 use osteon_common::parameters::Point;
 
-use super::speculation::realizations;
 use super::{batches, eta, sizing};
 use crate::core::batch::{Assignment, Purpose};
 use crate::core::evaluation::PendingEvaluation;
@@ -57,12 +56,12 @@ fn next(state: &State) -> Option<(JobId, Point)> {
         let job = state.jobs.get(id)?;
         let has_room = || {
             let more = job.record.specification.monte_carlo.realizations;
-            realizations(state) + more <= state.config.active_realizations_max
+            state.realizations() + more <= state.config.active_realizations_max
         };
         let place =
             job.speculation.candidates.iter().position(|at| match job.speculation.at(at) {
                 Some(begun) => !begun.queue.is_empty() && !begun.has_crashed_worker,
-                None => has_room(),
+                None => !job.ahead.has(at) && has_room(),
             })?;
         let certain = place == 0 && matches!(job.stage, Stage::StoringEvaluation { .. });
         let had = state.shares.used(&job.record.client);
@@ -117,7 +116,9 @@ fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> 
                 soon.then_some(evaluation.filled())
             }
             Stage::StoringEvaluation { .. } if has_next(job) => None,
-            Stage::StoringEvaluation { .. } | Stage::Replaying { .. } => Some(realizations),
+            Stage::StoringEvaluation { .. }
+            | Stage::StoringPrepared { .. }
+            | Stage::Replaying { .. } => Some(realizations),
             Stage::StoringSubmission | Stage::Waiting | Stage::StoringEnd(_) => None,
         }
     };
@@ -140,7 +141,9 @@ fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId) {
     };
     let (queued, spare) = (queued(job, &point), spare(turn.state, attached));
     let size = match batches::realizations_held(turn.state, attached) {
-        0 => sizing::batch_size(turn.state, attached, id, fleet, queued).max(spare.min(queued)),
+        0 => {
+            sizing::batch_size(turn.state, attached, id, fleet, (queued, 0)).max(spare.min(queued))
+        }
         _ => spare,
     };
     let Some((attempt, indices)) = take(turn.state, id, point, size) else {

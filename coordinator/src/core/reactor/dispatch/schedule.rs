@@ -27,7 +27,8 @@ pub(crate) fn free_workers<'a>(
 pub(crate) fn next_job(state: &State) -> Option<JobId> {
     let with_work = state.active.iter().filter_map(|id| {
         let job = state.jobs.get(id)?;
-        (!job.evaluation()?.queue.is_empty()).then_some((*id, job))
+        let asked_for = job.evaluation().is_some_and(|it| !it.queue.is_empty());
+        (asked_for || job.ahead.has_queue()).then_some((*id, job))
     });
     let rank = |(id, job): (JobId, &Job)| {
         let JobRecord { client, priority, .. } = &job.record;
@@ -40,9 +41,10 @@ pub(crate) fn next_job(state: &State) -> Option<JobId> {
 
 /// Returns whether any audit or dispute waits for a worker.
 pub(crate) fn checks_wait(state: &State) -> bool {
-    let mut evaluations = state.active.iter().filter_map(|id| state.jobs.get(id)?.evaluation());
-    evaluations.any(|evaluation| {
-        !evaluation.audits.is_empty()
-            || evaluation.disputes.iter().any(|dispute| dispute.tie_breakers.is_empty())
+    let mut jobs = state.active.iter().filter_map(|id| state.jobs.get(id));
+    jobs.any(|job| {
+        let mut disputes = job.evaluation().into_iter().flat_map(|asked_for| &asked_for.disputes);
+        job.certain().any(|evaluation| !evaluation.audits.is_empty())
+            || disputes.any(|dispute| dispute.tie_breakers.is_empty())
     })
 }

@@ -27,32 +27,37 @@ const WORTH_S: f64 = 0.02;
 /// Number of batches for which the rate of a fleet is used at least.
 const USES_MIN: u64 = 32;
 
-/// Returns the number of realizations of `job`, of which `queued` are left, that `attached` gets at
-/// once: as many as it computes in the target time, at most a quarter of its share. Both limits
-/// give way to one realization for each slot (a realization may take longer than the target, and a
-/// share may hold fewer than four for each slot), but the share itself gives way only to a batch that
-/// is worth its cost.
+/// Returns the number of realizations of `job`, of which `queued` are left in its evaluation and
+/// `further` in others, that `attached` gets at once: as many as it computes in the target time, at
+/// most a quarter of its share. Both limits give way to one realization for each slot (a realization
+/// may take longer than the target, and a share may hold fewer than four for each slot), but the share
+/// itself gives way only to a batch that is worth its cost.
+///
+/// Where there are further evaluations, a batch takes no longer than it has to be worth its cost: then
+/// each of them, which is one of a chain, is soon complete. The batches of one are of about equal size.
 pub(crate) fn batch_size(
     state: &State,
     attached: &AttachedWorker,
     job: JobId,
     fleet: FleetRate,
-    queued: u64,
+    (queued, further): (u64, u64),
 ) -> u64 {
     let rate = attached.rates.get(&job).copied();
     let slots = f64::from(attached.hello.slots);
     let weight = rate.unwrap_or(slots * fleet.per_slot);
     // A worker may be faster than the fleet was when it was measured.
-    let left = queued as f64;
+    let left = (queued + further) as f64;
     let share = left * (weight / fleet.total.max(weight));
     let worth = rate.map_or(0.0, |rate| (worth_s(left / rate) * rate).min(left));
     let most = (share / SHARE_DIVISOR).max(slots.min(share)).max(worth).ceil();
     let target = match rate {
+        Some(rate) if further > 0 => rate * WORTH_S.min(state.config.batch_target.as_secs_f64()),
         Some(rate) => rate * state.config.batch_target.as_secs_f64(),
         None => f64::from(FIRST_BATCH_PER_SLOT) * slots,
     };
     // `as` saturates, and converts NaN to 0.
-    (target.max(slots).min(most) as u64).clamp(1, BATCH_REALIZATIONS_MAX.into())
+    let size = (target.max(slots).min(most) as u64).clamp(1, BATCH_REALIZATIONS_MAX.into());
+    if further == 0 { size } else { queued.div_ceil(queued.div_ceil(size).max(1)) }
 }
 
 /// Returns the time that a batch should take at least, s, given that of all that is left.

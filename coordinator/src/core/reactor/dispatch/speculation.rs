@@ -11,12 +11,13 @@
 //! slots. Therefore no client is charged for it.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use osteon_common::job::JobKind;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Point;
 
-use super::batches;
+use super::{ahead, batches};
 use crate::config::Config;
 use crate::core::batch::{Assignment, Purpose};
 use crate::core::evaluation::PendingEvaluation;
@@ -42,17 +43,17 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
     let known =
         job.speculation.evaluations.iter().position(|known| same_point(&known.point, &point));
     let evaluation = match known.map(|at| job.speculation.evaluations.remove(at)) {
-        Some(mut known) => {
-            known.number = number;
-            // Disputes could not be decided before.
-            known.disputes.iter_mut().for_each(|dispute| dispute.since = turn.now);
+        Some(known) => {
             job.rate.add(known.filled(), turn.now);
-            known
+            renumbered(known, number, turn.now)
         }
-        None => {
-            let realizations = job.record.specification.monte_carlo.realizations;
-            PendingEvaluation::new(number, attempt, point, realizations)
-        }
+        None => match ahead::adopt(job, &point) {
+            Some(known) => renumbered(known, number, turn.now),
+            None => {
+                let realizations = job.record.specification.monte_carlo.realizations;
+                PendingEvaluation::new(number, attempt, point, realizations)
+            }
+        },
     };
     let speculates = speculates(&turn.state.config, job);
     let candidates = if speculates { job.search.candidates(CANDIDATES_MAX) } else { Vec::new() };
@@ -60,6 +61,14 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
     job.stage = Stage::Computing(evaluation);
     adopt_batches(turn.state, id, attempt);
     keep(turn, id, candidates);
+}
+
+/// Returns an evaluation that was begun before the search asked for it, as its evaluation `number`.
+fn renumbered(mut known: PendingEvaluation, number: u64, now: Duration) -> PendingEvaluation {
+    known.number = number;
+    // Disputes could not be decided before.
+    known.disputes.iter_mut().for_each(|dispute| dispute.since = now);
+    known
 }
 
 /// Updates the candidates of a job whose evaluation is complete and on its way to the store: the
@@ -88,7 +97,7 @@ pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
 
 /// Drops the newest speculative evaluations until the limit on realizations in memory is kept.
 pub(crate) fn drop_excess(turn: &mut Turn) {
-    while realizations(turn.state) > turn.state.config.active_realizations_max {
+    while turn.state.realizations() > turn.state.config.active_realizations_max {
         let newest = |id: &JobId| {
             let evaluations = &turn.state.jobs.get(id)?.speculation.evaluations;
             evaluations.last().map(|last| (evaluations.len(), *id, last.attempt))
@@ -113,7 +122,9 @@ fn speculates(config: &Config, job: &Job) -> bool {
 fn adopt_batches(state: &mut State, job: JobId, attempt: u64) {
     let of_attempt =
         |assignment: &Assignment| assignment.job == job && assignment.attempt == attempt;
-    let held = state.batches.iter().filter(|(_, batch)| of_attempt(&batch.assignment));
+    let held = state.batches.iter().filter(|(_, batch)| {
+        batch.purpose == Purpose::Speculative && of_attempt(&batch.assignment)
+    });
     let held: Vec<BatchId> = held.map(|(id, _)| *id).collect();
     for id in held {
         if let Some(batch) = state.batches.get_mut(&id) {
@@ -158,17 +169,6 @@ fn retain(turn: &mut Turn, id: JobId, stays: impl Fn(&PendingEvaluation) -> bool
     for batch in held {
         batches::revoke(turn, batch);
     }
-}
-
-/// Returns the number of realizations in the evaluations of all active jobs, speculative ones
-/// included.
-pub(crate) fn realizations(state: &State) -> u64 {
-    let of_job = |id: &JobId| {
-        let job = state.jobs.get(id)?;
-        let each = job.record.specification.monte_carlo.realizations;
-        Some(each * (1 + job.speculation.evaluations.len() as u64))
-    };
-    state.active.iter().filter_map(of_job).sum()
 }
 
 impl Speculation {

@@ -76,7 +76,7 @@ pub(crate) fn answered(
         }
         None => checks::compare(turn, &assignment, &solved, &name),
     }
-    jobs::store_if_complete(turn, assignment.job);
+    jobs::settle(turn, assignment.job, assignment.attempt);
     departures::dismiss_if_drained(turn, worker);
 }
 
@@ -101,8 +101,7 @@ fn fill(
     let before = evaluation.filled();
     evaluation.fill(assignment.indices, solved, by);
     let news = evaluation.filled() - before;
-    let asked_for =
-        |job: &&mut Job| job.evaluation().is_some_and(|it| it.attempt == assignment.attempt);
+    let asked_for = |job: &&mut Job| job.certain().any(|it| it.attempt == assignment.attempt);
     if let Some(job) = state.jobs.get_mut(&assignment.job).filter(asked_for) {
         job.rate.add(news, now);
         job.progressed = now;

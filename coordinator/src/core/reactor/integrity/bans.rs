@@ -6,7 +6,7 @@ use crate::core::effect::{Effect, Record};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::Stage;
-use crate::core::reactor::dispatch::{batches, speculation};
+use crate::core::reactor::dispatch::{ahead, batches, speculation};
 use crate::core::reactor::lifecycle::{jobs, records, replay, workers};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::Banned;
@@ -42,6 +42,7 @@ pub(crate) fn ban(turn: &mut Turn, name: &WorkerName, job: JobId, reason: String
 /// Removes the answers of a worker from a job.
 fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     speculation::forget(turn, id, name);
+    ahead::forget(turn, id, name);
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
@@ -72,6 +73,14 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
             if job.restart_pending {
                 // The search may continue elsewhere after its restart.
                 speculation::drop_all(turn, id);
+                ahead::drop_all(turn, id);
+            }
+        }
+        Stage::StoringPrepared { records, .. } => {
+            let of_records = records.iter().any(|record| record.workers.contains(name));
+            job.restart_pending |= contributed || of_records;
+            if job.restart_pending {
+                ahead::drop_all(turn, id);
             }
         }
         Stage::StoringEnd(_) if contributed => {

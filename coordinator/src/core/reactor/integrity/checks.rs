@@ -12,6 +12,7 @@ use crate::core::dispute::{Contradiction, Dispute, Vote, VoteResult};
 use crate::core::evaluation::{Audit, PendingEvaluation};
 use crate::core::failure::{RunFailure, shown};
 use crate::core::ids::{BatchId, JobId};
+use crate::core::job::Job;
 use crate::core::reactor::dispatch::{overdue, poison};
 use crate::core::reactor::lifecycle::jobs;
 use crate::core::reactor::turn::Turn;
@@ -112,26 +113,32 @@ pub(crate) fn give_up(turn: &mut Turn) {
     }
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
     for job in active {
-        give_up_audits(turn.state, job);
-        jobs::store_if_complete(turn, job);
+        for attempt in give_up_audits(turn.state, job) {
+            jobs::settle(turn, job, attempt);
+        }
         if let Some(failure) = undecided(turn.state, job, turn.now) {
             jobs::fail(turn, job, &failure);
         }
     }
 }
 
-fn give_up_audits(state: &mut State, job: JobId) {
-    let Some(evaluation) = state.evaluation_mut(job) else {
-        return;
+/// Gives up the audits of a job that no other worker can compute. Returns the attempts at its
+/// evaluations, which may be complete now.
+fn give_up_audits(state: &mut State, id: JobId) -> Vec<u64> {
+    let Some(job) = state.jobs.get_mut(&id) else {
+        return Vec::new();
     };
-    if evaluation.audits.is_empty() {
-        return;
+    let attempts: Vec<u64> = job.certain().map(|it| it.attempt).collect();
+    let with = job.certain_mut().filter(|it| !it.audits.is_empty());
+    let pending: Vec<_> = with.map(|it| (it.attempt, std::mem::take(&mut it.audits))).collect();
+    for (attempt, mut audits) in pending {
+        audits.retain(|audit| state.answers_batches(|name| *name != audit.by));
+        let mut evaluations = state.jobs.get_mut(&id).into_iter().flat_map(Job::certain_mut);
+        if let Some(evaluation) = evaluations.find(|it| it.attempt == attempt) {
+            evaluation.audits = audits;
+        }
     }
-    let mut audits = std::mem::take(&mut evaluation.audits);
-    audits.retain(|audit| state.answers_batches(|name| *name != audit.by));
-    if let Some(evaluation) = state.evaluation_mut(job) {
-        evaluation.audits = audits;
-    }
+    attempts
 }
 
 /// Returns the failure of a job with a dispute that cannot be decided, if there is one.

@@ -1,21 +1,26 @@
 //! Life cycle of a job, from acceptance to end.
 
 use std::cmp::Reverse;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use osteon_common::results::Status;
 use osteon_common::version::Program;
 
+use crate::core::ahead::Prepared;
 use crate::core::effect::{Effect, Record};
 use crate::core::failure::RunFailure;
 use crate::core::ids::JobId;
 use crate::core::job::{Job, Stage};
 use crate::core::notice::Notice;
-use crate::core::reactor::dispatch::{batches, speculation};
+use crate::core::reactor::dispatch::{ahead, batches, speculation};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
 use osteon_search::{Ending, Search, Step};
+
+/// Maximum number of evaluations, and of realizations in them, that are stored together.
+const STORED_TOGETHER_MAX: (usize, usize) = (256, 1 << 20);
 
 /// Stores the evaluation of a job once it is complete and checked.
 pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
@@ -32,7 +37,15 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     // Only an evaluation that was stored before, with the same outcomes, leaves those after it
     // valid.
     let is_last = evaluation.diverges_from_store(&outcomes);
-    let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
+    let workers: BTreeSet<_> = std::mem::take(&mut evaluation.workers).into_iter().collect();
+    let prepared = Prepared {
+        part: None,
+        outcomes: Arc::clone(&outcomes),
+        estimated_error,
+        workers: workers.clone(),
+        assessment: None,
+    };
+    ahead::keep_start(job, &point, prepared);
     let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
     turn.effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
     let outcomes = record.outcomes.clone();
@@ -40,6 +53,13 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     if is_last {
         speculation::prepare(turn, id, &outcomes);
     }
+    ahead::refresh(turn.state, id);
+}
+
+/// Takes in an evaluation that may be complete: that of the search, or one ahead of it.
+pub(crate) fn settle(turn: &mut Turn, id: JobId, attempt: u64) {
+    ahead::settle(turn, id, attempt);
+    store_if_complete(turn, id);
 }
 
 /// Ends a job because of `failure`.
@@ -72,6 +92,7 @@ pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
         Stage::StoringSubmission
         | Stage::Replaying { .. }
         | Stage::StoringEvaluation { .. }
+        | Stage::StoringPrepared { .. }
         | Stage::StoringEnd(_) => {}
     }
 }
@@ -138,16 +159,63 @@ pub(crate) fn advance(turn: &mut Turn, id: JobId) {
         read_next(turn, id);
         return;
     }
+    let part = job.search.part();
     let ending = match job.search.ask() {
         Step::Evaluate(_) if job.cancelled => cancelled(),
+        Step::Evaluate(_) if store_prepared(turn, id) => {
+            ahead::drop_before(turn, id, part);
+            return;
+        }
         Step::Evaluate(point) => {
             speculation::begin(turn, id, point);
+            // From here on the search computes the points of this part itself.
+            ahead::drop_before(turn, id, part + 1);
+            ahead::refresh(turn.state, id);
             store_if_complete(turn, id);
             return;
         }
         Step::Done(ending) => ending,
     };
     finish(turn, id, ending);
+}
+
+/// Stores the evaluations that a job's search asks for next, as far as they are complete already.
+/// Returns whether there are any.
+fn store_prepared(turn: &mut Turn, id: JobId) -> bool {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return false;
+    };
+    let Step::Evaluate(first) = job.search.ask() else {
+        return false;
+    };
+    if job.ahead.prepared(&first).is_none() {
+        return false;
+    }
+    let mut after = Box::new(job.search.clone());
+    let mut records = Vec::new();
+    let (records_max, realizations_max) = STORED_TOGETHER_MAX;
+    let mut realizations = 0;
+    while let Step::Evaluate(point) = after.ask()
+        && records.len() < records_max
+        && realizations < realizations_max
+        && let Some(prepared) = job.ahead.take_prepared(&point)
+    {
+        let Prepared { outcomes, estimated_error, workers, assessment, .. } = prepared;
+        realizations += outcomes.len();
+        let number = after.evaluations();
+        if let Some(assessment) = assessment {
+            after.anticipate(assessment);
+        }
+        after.tell(Arc::clone(&outcomes), estimated_error);
+        records.push(EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers });
+    }
+    turn.effects.push(Effect::Store(Record::Evaluations(records.clone())));
+    job.progressed = turn.now;
+    job.stage = Stage::StoringPrepared { records, after };
+    // Its candidates were those of another point.
+    speculation::drop_all(turn, id);
+    ahead::refresh(turn.state, id);
+    true
 }
 
 /// Stores the end of a job; clients see it when it is durable.

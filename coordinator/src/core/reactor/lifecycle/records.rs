@@ -45,6 +45,20 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
                 jobs::advance(turn, id);
             }
         }
+        (RecordKey::Evaluation(number), Stage::StoringPrepared { records, after })
+            if records.last().is_some_and(|last| last.number == number) =>
+        {
+            job.stored = number + 1;
+            records.iter_mut().for_each(|record| job.workers.append(&mut record.workers));
+            job.store_retry = None;
+            // The search is moved out of a stage that ends here.
+            std::mem::swap(&mut job.search, after);
+            if job.restart_pending {
+                jobs::restart(turn, id);
+            } else {
+                jobs::advance(turn, id);
+            }
+        }
         (RecordKey::End, Stage::StoringEnd(_)) => {
             on_end_stored(turn, id);
             return;
@@ -100,6 +114,9 @@ pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
         Stage::StoringEvaluation { record, is_last } => {
             let record = record.clone();
             Effect::Store(Record::Evaluation { record, is_last: *is_last })
+        }
+        Stage::StoringPrepared { records, .. } => {
+            Effect::Store(Record::Evaluations(records.clone()))
         }
         Stage::StoringEnd(end) => {
             let summary = Arc::new(job.search.summary());
@@ -159,6 +176,9 @@ impl Job {
         match &self.stage {
             Stage::StoringSubmission => Some(RecordKey::Job),
             Stage::StoringEvaluation { record, .. } => Some(RecordKey::Evaluation(record.number)),
+            Stage::StoringPrepared { records, .. } => {
+                records.last().map(|last| RecordKey::Evaluation(last.number))
+            }
             Stage::StoringEnd(_) => Some(RecordKey::End),
             Stage::Waiting | Stage::Replaying { .. } | Stage::Computing(_) => None,
         }

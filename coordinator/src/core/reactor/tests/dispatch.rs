@@ -6,6 +6,11 @@ use crate::core::reactor::dispatch::sizing::{batch_size, fleet_rate, measured};
 /// Checks the batch size for worker 1, with workers of `threads` measured at `rates` realizations
 /// per second, when `queued` realizations are left.
 fn check_size(threads: &[u32], rates: &[Option<f64>], queued: u64, expected: u64) {
+    check_size_of(threads, rates, (queued, 0), expected);
+}
+
+/// As [`check_size`], with the realizations that are left in other evaluations of the job.
+fn check_size_of(threads: &[u32], rates: &[Option<f64>], queued: (u64, u64), expected: u64) {
     let mut rig = Rig::with(1, threads);
     for (worker, rate) in rig.state.workers.values_mut().zip(rates) {
         worker.rates.clear();
@@ -13,7 +18,7 @@ fn check_size(threads: &[u32], rates: &[Option<f64>], queued: u64, expected: u64
     }
     let fleet = measured(&rig.state, JobId(1));
     let size = batch_size(&rig.state, &rig.state.workers[&WorkerId(1)], JobId(1), fleet, queued);
-    assert_eq!(size, expected, "{threads:?} {rates:?} {queued}");
+    assert_eq!(size, expected, "{threads:?} {rates:?} {queued:?}");
 }
 
 #[test]
@@ -36,6 +41,16 @@ fn batches_take_the_target_time_and_leave_work_for_the_others() {
     // With more work, a hundredth of a second and more; with much, a quarter of the share.
     many(100_000, 320);
     many(1_000_000, 2500);
+    // Where other evaluations of the job wait, too, batches of one evaluation that take a fiftieth of a
+    // second, of equal size.
+    let among_others = |queued, expected| {
+        let fleet = [Some(16_000.0); 100];
+        check_size_of(&[16; 100], &fleet, (queued, 1_000_000), expected);
+    };
+    among_others(1024, 256);
+    among_others(2747, 306);
+    among_others(64, 64);
+    check_size_of(&[2], &[Some(4000.0)], (2747, 2747), 79);
     // Never more than a message may hold.
     check_size(&[2], &[Some(1e12)], 10_000_000, 65_536);
     // A quarter of the share of the remaining realizations; shares are proportional to the rates.

@@ -1,0 +1,122 @@
+//! Evaluations that a job's search will ask for later: those of its other groups and starts.
+//!
+//! Each part of the search that it has not come to yet may have a branch (`osteon_search::Branch`),
+//! whose points are evaluated like any other. Their outcomes wait here until the search asks for these
+//! points, in its own order, and are stored as its evaluations only then. So results, store and digest
+//! are the same as without branches.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use osteon_common::outcome::Outcome;
+use osteon_common::parameters::{PARAMETERS, Point};
+use osteon_common::results::EstimatedError;
+use osteon_search::{Assessment, Branch, same_point};
+
+use crate::core::evaluation::PendingEvaluation;
+use crate::core::worker_name::WorkerName;
+
+/// What a job computes before its search asks for it.
+#[derive(Debug, Default)]
+pub(crate) struct Ahead {
+    /// Branches under way, in the order of their parts.
+    pub(crate) branches: Vec<FollowedBranch>,
+    /// Number of the first part that has had no branch yet.
+    pub(crate) next_part: u64,
+    /// Complete evaluations, by their points.
+    prepared: BTreeMap<PointBits, Prepared>,
+}
+
+/// A branch, and the evaluation of its pending point.
+#[derive(Debug)]
+pub(crate) struct FollowedBranch {
+    /// Number of the part of the search.
+    pub(crate) part: u64,
+    pub(crate) branch: Branch,
+    /// `None` while another evaluation of the job is at the same point, and while there is no room for
+    /// more realizations.
+    pub(crate) evaluation: Option<PendingEvaluation>,
+}
+
+/// A complete evaluation that the search has not asked for yet.
+#[derive(Debug, Clone)]
+pub(crate) struct Prepared {
+    /// The part of the search that will ask for it; `None` if several will.
+    pub(crate) part: Option<u64>,
+    pub(crate) outcomes: Arc<[Outcome]>,
+    pub(crate) estimated_error: Option<EstimatedError>,
+    /// All workers whose answers are in it.
+    pub(crate) workers: BTreeSet<WorkerName>,
+    /// Its moments and cost in that part.
+    pub(crate) assessment: Option<Assessment>,
+}
+
+/// A point, to be compared to the bit.
+type PointBits = [u64; PARAMETERS];
+
+impl Ahead {
+    /// Returns the evaluations under way.
+    pub(crate) fn evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
+        self.branches.iter().filter_map(|followed| followed.evaluation.as_ref())
+    }
+
+    /// As [`Ahead::evaluations`].
+    pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
+        self.branches.iter_mut().filter_map(|followed| followed.evaluation.as_mut())
+    }
+
+    /// Returns whether any realization waits to be sent.
+    pub(crate) fn has_queue(&self) -> bool {
+        self.evaluations().any(|evaluation| !evaluation.queue.is_empty())
+    }
+
+    /// Returns the number of evaluations, under way or complete.
+    pub(crate) fn count(&self) -> usize {
+        self.evaluations().count() + self.prepared.len()
+    }
+
+    /// Returns whether a point is evaluated, or has been.
+    pub(crate) fn has(&self, point: &Point) -> bool {
+        self.prepared(point).is_some() || self.evaluations().any(|it| same_point(&it.point, point))
+    }
+
+    /// Returns the complete evaluation of a point.
+    pub(crate) fn prepared(&self, point: &Point) -> Option<&Prepared> {
+        self.prepared.get(&bits(point))
+    }
+
+    /// Returns the complete evaluations.
+    pub(crate) fn all_prepared(&self) -> impl Iterator<Item = &Prepared> {
+        self.prepared.values()
+    }
+
+    /// Keeps the complete evaluation of a point.
+    pub(crate) fn prepare(&mut self, point: &Point, prepared: Prepared) {
+        self.prepared.insert(bits(point), prepared);
+    }
+
+    /// Takes the complete evaluation of a point, which stays if several parts ask for it.
+    pub(crate) fn take_prepared(&mut self, point: &Point) -> Option<Prepared> {
+        let prepared = self.prepared(point)?.clone();
+        if prepared.part.is_some() {
+            self.prepared.remove(&bits(point));
+        }
+        Some(prepared)
+    }
+
+    /// Drops the complete evaluations that belong only to parts before `part`.
+    pub(crate) fn drop_before(&mut self, part: u64) {
+        self.prepared.retain(|_, prepared| prepared.part.is_none_or(|of| of >= part));
+    }
+
+    /// Drops all branches, and the complete evaluations with answers of a banned worker.
+    pub(crate) fn forget(&mut self, name: &WorkerName) {
+        self.branches.clear();
+        self.next_part = 0;
+        self.prepared.retain(|_, prepared| !prepared.workers.contains(name));
+    }
+}
+
+fn bits(point: &Point) -> PointBits {
+    point.0.map(f64::to_bits)
+}

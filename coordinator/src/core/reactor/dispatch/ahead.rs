@@ -1,0 +1,208 @@
+//! Parts of a search that are computed before the search comes to them.
+//!
+//! The search of a job asks for one point after another, and a single evaluation keeps a large fleet
+//! busy only for moments. Other groups and other starts are independent of it, so their points are
+//! evaluated at the same time. These evaluations are work like any other: their batches are charged to
+//! the client and audited. Only disputes and quarantined realizations wait until the search asks for
+//! the point, because they may end the job.
+//!
+//! [`refresh`] sees to it that a job with further parts always has something to send, and that no
+//! part begins before it is needed for that.
+
+use std::sync::Arc;
+
+use osteon_common::parameters::Point;
+use osteon_search::same_point;
+
+use super::batches;
+use crate::core::ahead::{FollowedBranch, Prepared};
+use crate::core::batch::Assignment;
+use crate::core::evaluation::PendingEvaluation;
+use crate::core::ids::{BatchId, JobId};
+use crate::core::job::{Job, Stage};
+use crate::core::reactor::turn::Turn;
+use crate::core::state::State;
+use crate::core::worker_name::WorkerName;
+
+/// Begins evaluations of further parts of a job's search until one waits to be sent.
+pub(crate) fn refresh(state: &mut State, id: JobId) {
+    while let Some(job) = state.jobs.get_mut(&id) {
+        if !state.config.ahead || !computes(job) || job.ahead.has_queue() {
+            return;
+        }
+        job.ahead.next_part = job.ahead.next_part.max(job.search.part() + 1);
+        let mut idle = job.ahead.branches.iter().filter(|it| it.evaluation.is_none());
+        if let Some(part) = idle.next().map(|it| it.part) {
+            let waits = |it: &FollowedBranch| it.part >= part && it.evaluation.is_none();
+            let parts = job.ahead.branches.iter().filter(|it| waits(it)).map(|it| it.part);
+            let parts: Vec<u64> = parts.collect();
+            if parts.into_iter().any(|part| begin(state, id, part)) {
+                return;
+            }
+        }
+        let Some(job) = state.jobs.get_mut(&id) else {
+            return;
+        };
+        // A branch that waits for a point, or for room, shows that the next would wait, too.
+        if job.ahead.branches.iter().any(|it| it.evaluation.is_none()) {
+            return;
+        }
+        let part = job.ahead.next_part;
+        let Some(branch) = job.search.branch(part) else {
+            return;
+        };
+        job.ahead.next_part += 1;
+        job.ahead.branches.push(FollowedBranch { part, branch, evaluation: None });
+    }
+}
+
+/// Keeps the outcomes of a point that a job's search has asked for, if later parts will ask for the
+/// same: the searches for all groups begin at one point.
+pub(crate) fn keep_start(job: &mut Job, point: &Point, prepared: Prepared) {
+    if job.search.evaluations() == 0 && job.search.shares_start(0, point) {
+        job.ahead.prepare(point, Prepared { part: None, ..prepared });
+    }
+}
+
+/// Takes in a complete evaluation of a branch, if `attempt` is one, and begins the next.
+pub(crate) fn settle(turn: &mut Turn, id: JobId, attempt: u64) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let of_attempt = |it: &&mut FollowedBranch| {
+        it.evaluation.as_ref().is_some_and(|evaluation| evaluation.attempt == attempt)
+    };
+    let Some(followed) = job.ahead.branches.iter_mut().find(of_attempt) else {
+        return;
+    };
+    let complete = followed.evaluation.as_ref().and_then(PendingEvaluation::complete);
+    let Some((outcomes, estimated_error)) = complete else {
+        return;
+    };
+    let Some(evaluation) = followed.evaluation.take() else {
+        return;
+    };
+    let assessment = followed.branch.tell(&outcomes);
+    let part = followed.part;
+    let is_first = followed.branch.evaluations() == 1;
+    let is_shared = is_first && job.search.shares_start(part, &evaluation.point);
+    let of_part = (!is_shared).then_some(part);
+    let workers = evaluation.workers.into_iter().collect();
+    let prepared =
+        Prepared { part: of_part, outcomes, estimated_error, workers, assessment };
+    job.ahead.prepare(&evaluation.point, prepared);
+    begin(turn.state, id, part);
+    refresh(turn.state, id);
+}
+
+/// Gives a job's search the evaluation of the point that it asks for, if one is under way.
+pub(crate) fn adopt(job: &mut Job, point: &Point) -> Option<PendingEvaluation> {
+    let is_at = |it: &&mut FollowedBranch| {
+        it.evaluation.as_ref().is_some_and(|evaluation| same_point(&evaluation.point, point))
+    };
+    job.ahead.branches.iter_mut().find(is_at)?.evaluation.take()
+}
+
+/// Drops what only parts before `part` need: the search has come to this part.
+pub(crate) fn drop_before(turn: &mut Turn, id: JobId, part: u64) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.ahead.drop_before(part);
+    let passed = job.ahead.branches.extract_if(.., |it| it.part < part);
+    let gone: Vec<u64> = passed.filter_map(|it| Some(it.evaluation?.attempt)).collect();
+    revoke(turn, id, &gone);
+}
+
+/// Drops everything that may contain answers of a banned worker.
+pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let gone: Vec<u64> = job.ahead.evaluations().map(|it| it.attempt).collect();
+    job.ahead.forget(name);
+    revoke(turn, id, &gone);
+}
+
+/// Drops everything.
+pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let ahead = std::mem::take(&mut job.ahead);
+    let gone: Vec<u64> = ahead.evaluations().map(|it| it.attempt).collect();
+    revoke(turn, id, &gone);
+}
+
+/// Returns the number of realizations that the known parts of a search will need at least, beyond
+/// those of the evaluation it asked for: those that wait, and one evaluation for each further part.
+pub(crate) fn left(job: &Job) -> u64 {
+    let waiting: u64 = job.ahead.evaluations().map(PendingEvaluation::queued).sum();
+    let further = job.search.parts().saturating_sub(job.ahead.next_part);
+    waiting + further * job.record.specification.monte_carlo.realizations
+}
+
+/// Returns whether parts of a job's search may be computed now.
+fn computes(job: &Job) -> bool {
+    let under_way = match job.stage {
+        Stage::Computing(_) | Stage::StoringEvaluation { .. } | Stage::StoringPrepared { .. } => {
+            true
+        }
+        Stage::StoringSubmission
+        | Stage::Waiting
+        | Stage::Replaying { .. }
+        | Stage::StoringEnd(_) => false,
+    };
+    // Stored evaluations that the search has not received tell more than branches.
+    let is_replayed = job.search.evaluations() >= job.stored;
+    under_way && is_replayed && !job.cancelled && !job.restart_pending
+}
+
+/// Begins the evaluation of the pending point of a branch. Points that are known already are passed
+/// to it first; a branch that has ended is removed. Returns whether an evaluation has begun.
+fn begin(state: &mut State, id: JobId, part: u64) -> bool {
+    loop {
+        let attempt = state.new_attempt();
+        let realizations_max = state.config.active_realizations_max;
+        let in_memory = state.realizations();
+        let Some(job) = state.jobs.get_mut(&id) else {
+            return false;
+        };
+        let Some(at) = job.ahead.branches.iter().position(|it| it.part == part) else {
+            return false;
+        };
+        let Some(point) = job.ahead.branches[at].branch.point() else {
+            job.ahead.branches.remove(at);
+            return false;
+        };
+        if let Some(known) = job.ahead.prepared(&point) {
+            let outcomes = Arc::clone(&known.outcomes);
+            job.ahead.branches[at].branch.tell(&outcomes);
+            continue;
+        }
+        let realizations = job.record.specification.monte_carlo.realizations;
+        let is_under_way = job.evaluations().any(|it| same_point(&it.point, &point));
+        if is_under_way || in_memory + realizations > realizations_max {
+            return false;
+        }
+        // The lowest number that it may get. The number only decides which batches are audited.
+        let number = job.search.evaluations() + 1;
+        let evaluation = PendingEvaluation::new(number, attempt, point, realizations);
+        job.ahead.branches[at].evaluation = Some(evaluation);
+        return true;
+    }
+}
+
+/// Revokes the batches of these attempts at evaluations.
+fn revoke(turn: &mut Turn, id: JobId, gone: &[u64]) {
+    if gone.is_empty() {
+        return;
+    }
+    let of_gone =
+        |assignment: &Assignment| assignment.job == id && gone.contains(&assignment.attempt);
+    let held = turn.state.batches.iter().filter(|(_, batch)| of_gone(&batch.assignment));
+    let held: Vec<BatchId> = held.map(|(id, _)| *id).collect();
+    for batch in held {
+        batches::revoke(turn, batch);
+    }
+}
