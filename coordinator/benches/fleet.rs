@@ -1,5 +1,5 @@
 //! Cost of the coordinator's core by the number of workers: `cargo bench -p osteon-coordinator --bench
-//! fleet`
+//! fleet [propagations|groups]`
 //!
 //! Jobs run on a simulated fleet, whose time is not that of a clock: a worker answers a batch when its
 //! slots would have computed it. The core reacts to one event after another, and while it does, which
@@ -12,10 +12,11 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::time::{Duration, Instant};
 
-use osteon_coordinator::config::Config;
-use osteon_coordinator::core::effect::Effect;
+use osteon_common::job::{Data, Group, JobSpecification, Sampling, Search, SearchMethod};
+use osteon_coordinator::config::{AUDIT_FRACTION, Config};
+use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::{Event, Hello};
-use osteon_coordinator::core::ids::WorkerId;
+use osteon_coordinator::core::ids::{ReplyId, WorkerId};
 use osteon_coordinator::core::reactor::react;
 use osteon_coordinator::core::state::State;
 
@@ -31,15 +32,30 @@ const TICK: Duration = Duration::from_millis(100);
 const HEARTBEAT: Duration = Duration::from_secs(2);
 /// Time of a message on its way.
 const LATENCY: Duration = Duration::from_micros(100);
+/// Time until a record is durable.
+const SYNC: Duration = Duration::from_millis(4);
+/// Realizations of an evaluation of each group.
+const OF_GROUP: u64 = 1024;
 /// Longest simulated time of a job.
 const LIMIT: Duration = Duration::from_secs(3600);
 
 /// One row of the table.
 struct Row {
     workers: u32,
-    realizations: u64,
+    job: Job,
     /// Time of one realization.
     each: Duration,
+    /// Groups are computed at the same time.
+    ahead: bool,
+}
+
+/// A job to measure.
+#[derive(Debug, Clone, Copy)]
+enum Job {
+    /// A propagation of so many realizations.
+    Propagation(u64),
+    /// An identification of so many groups.
+    Groups(usize),
 }
 
 /// An occurrence of the simulation.
@@ -49,6 +65,8 @@ enum Next {
     Heartbeat(u64),
     /// A worker answers the batch that it holds longest.
     Answer(u64),
+    /// The record that has waited longest is durable.
+    Stored,
 }
 
 /// A fleet with its coordinator.
@@ -60,6 +78,10 @@ struct Fleet {
     numbers: u64,
     /// Batches of each worker in the order they were sent, each with the time at which it ends.
     held: BTreeMap<u64, VecDeque<(Effect, Duration)>>,
+    /// Events that report records on their way to the store.
+    storing: VecDeque<Event>,
+    /// Number of evaluations that were stored, with their realizations.
+    stored: (u64, u64),
     batches: u64,
     core: Duration,
     longest: Duration,
@@ -67,11 +89,23 @@ struct Fleet {
 
 fn main() {
     let full = std::env::args().any(|argument| argument == "--bench");
+    let fleets: &[u32] = if full { &[10, 30, 100, 300, 1000, 3000] } else { &[3, 30] };
+    let chosen = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
+    let wants = |table: &str| chosen.as_ref().is_none_or(|chosen| chosen == table);
+    if wants("propagations") {
+        propagations(full, fleets);
+    }
+    if wants("groups") {
+        groups(full, fleets);
+    }
+}
+
+/// Prints what single evaluations cost.
+fn propagations(full: bool, fleets: &[u32]) {
     println!(
         "| workers | realizations | each | ideal | job | of ideal | batches | core per batch | per realization | longest event |"
     );
     println!("|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
-    let fleets: &[u32] = if full { &[10, 30, 100, 300, 1000, 3000] } else { &[3, 30] };
     let jobs: &[(u64, u64)] = if full {
         &[(1_000_000, 1000), (1_000_000, 20_000), (2747, 1000)]
     } else {
@@ -79,40 +113,88 @@ fn main() {
     };
     for &(realizations, each) in jobs {
         for &workers in fleets {
-            let row = Row { workers, realizations, each: Duration::from_micros(each) };
-            println!("{}", measured(&row));
+            let job = Job::Propagation(realizations);
+            let each = Duration::from_micros(each);
+            println!("{}", measured(&Row { workers, job, each, ahead: true }));
+        }
+    }
+}
+
+/// Prints what the searches for many groups cost, at the same time and one after the other.
+fn groups(full: bool, fleets: &[u32]) {
+    println!(
+        "| workers | groups | at once | evaluations | each | ideal | job | of ideal | batches | core per batch | per realization | longest event |"
+    );
+    println!("|--:|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+    let groups = if full { 1000 } else { 20 };
+    for &workers in fleets {
+        for ahead in [true, false] {
+            let each = Duration::from_millis(1);
+            println!("{}", measured(&Row { workers, job: Job::Groups(groups), each, ahead }));
         }
     }
 }
 
 fn measured(row: &Row) -> String {
     let mut fleet = Fleet::new(row);
+    let warm_up = match row.job {
+        Job::Propagation(realizations) => realizations.min(100_000),
+        Job::Groups(_) => OF_GROUP,
+    };
     // The first job measures the rates of the workers, as most jobs of a search find them.
-    let _ = fleet.run(row.realizations.min(100_000), 1);
+    let _ = fleet.run(&fake::propagation(warm_up, 1));
     fleet.core = Duration::ZERO;
-    (fleet.batches, fleet.longest) = (0, Duration::ZERO);
-    let took = fleet.run(row.realizations, 2);
+    (fleet.batches, fleet.longest, fleet.stored) = (0, Duration::ZERO, (0, 0));
+    let took = match row.job {
+        Job::Propagation(realizations) => fleet.run(&fake::propagation(realizations, 2)),
+        Job::Groups(groups) => fleet.run(&grouped(groups)),
+    };
+    let (evaluations, realizations) = fleet.stored;
     let ideal =
-        row.each.mul_f64(row.realizations as f64 / f64::from(row.workers * SLOTS)).max(row.each);
+        row.each.mul_f64(realizations as f64 / f64::from(row.workers * SLOTS)).max(row.each);
     let micros = |time: Duration| time.as_secs_f64() * 1e6;
+    let job = match row.job {
+        Job::Propagation(realizations) => format!("{realizations}"),
+        Job::Groups(groups) => {
+            let at_once = if row.ahead { "yes" } else { "no" };
+            format!("{groups} | {at_once} | {evaluations}")
+        }
+    };
     format!(
-        "| {} | {} | {:?} | {:.4} s | {:.4} s | {:.3} | {} | {:.1} µs | {:.3} µs | {:.2} ms |",
+        "| {} | {job} | {:?} | {:.4} s | {:.4} s | {:.3} | {} | {:.1} µs | {:.3} µs | {:.2} ms |",
         row.workers,
-        row.realizations,
         row.each,
         ideal.as_secs_f64(),
         took.as_secs_f64(),
         ideal.as_secs_f64() / took.as_secs_f64(),
         fleet.batches,
         micros(fleet.core) / fleet.batches as f64,
-        micros(fleet.core) / row.realizations as f64,
+        micros(fleet.core) / realizations as f64,
         fleet.longest.as_secs_f64() * 1e3,
     )
 }
 
+/// An identification of so many groups of twenty velocities, by Newton's method.
+fn grouped(groups: usize) -> JobSpecification {
+    let group = |number: usize| {
+        let mean = 3700.0 + 400.0 * (number as f64 / groups as f64);
+        let velocities = (0..20).map(|k| mean * (1.0 + 0.004 * (f64::from(k) - 9.5))).collect();
+        Group::new(format!("group {number}"), velocities)
+    };
+    let mut job = fake::identification(OF_GROUP, 60, 3);
+    job.search = Search { max_evaluations: 60, ..Search::by(SearchMethod::Newton) };
+    job.monte_carlo.sampling = Sampling::Sobol;
+    job.data = Some(Data::from_groups((0..groups).map(group).collect()));
+    job
+}
+
 impl Fleet {
     fn new(row: &Row) -> Self {
-        let config = Config { audit_fraction: 0.0, ..Config::default() };
+        let audit_fraction = match row.job {
+            Job::Propagation(_) => 0.0,
+            Job::Groups(_) => AUDIT_FRACTION,
+        };
+        let config = Config { audit_fraction, ahead: row.ahead, ..Config::default() };
         let mut fleet = Self {
             state: State::new(config, Duration::ZERO),
             each: row.each,
@@ -120,6 +202,8 @@ impl Fleet {
             queue: BinaryHeap::new(),
             numbers: 0,
             held: BTreeMap::new(),
+            storing: VecDeque::new(),
+            stored: (0, 0),
             batches: 0,
             core: Duration::ZERO,
             longest: Duration::ZERO,
@@ -134,13 +218,10 @@ impl Fleet {
     }
 
     /// Runs a job to its end; returns the simulated time.
-    fn run(&mut self, realizations: u64, seed: u64) -> Duration {
+    fn run(&mut self, job: &JobSpecification) -> Duration {
         let begun = self.now;
-        let request = fake::submission(&fake::propagation(realizations, seed), "");
-        self.react(Event::Requested {
-            reply_id: osteon_coordinator::core::ids::ReplyId(seed),
-            request,
-        });
+        let request = fake::submission(job, "");
+        self.react(Event::Requested { reply_id: ReplyId(1), request });
         while !self.state.is_idle() {
             let Reverse((at, _, next)) = self.queue.pop().unwrap();
             // An event that comes while the core is busy waits.
@@ -156,6 +237,10 @@ impl Fleet {
                     self.react(Event::Heartbeat { worker: WorkerId(worker) });
                 }
                 Next::Answer(worker) => self.answer(worker),
+                Next::Stored => {
+                    let stored = self.storing.pop_front().unwrap();
+                    self.react(stored);
+                }
             }
         }
         self.now - begun
@@ -202,7 +287,15 @@ impl Fleet {
                 }
                 Effect::Store(record) => {
                     let (job, key) = record.key();
-                    self.react(Event::Stored { job, key });
+                    self.storing.push_back(Event::Stored { job, key });
+                    self.schedule(SYNC, Next::Stored);
+                    let records = match &record {
+                        Record::Evaluation { record, .. } => std::slice::from_ref(record),
+                        Record::Evaluations(records) => records,
+                        _ => &[],
+                    };
+                    self.stored.0 += records.len() as u64;
+                    self.stored.1 += records.iter().map(|it| it.outcomes.len() as u64).sum::<u64>();
                 }
                 _ => {}
             }

@@ -206,7 +206,7 @@ impl Search {
             return;
         };
         let assessment = match self.assessment.take() {
-            Some(known) if known.is_of(self.set(), &outcomes) => known,
+            Some(known) if known.is_of(&outcomes) => self.of_this_set(&point, known),
             _ => self.assess(&point, &outcomes),
         };
         let mut row = Evaluation { estimated_error, ..self.row(point, &assessment) };
@@ -238,6 +238,18 @@ impl Search {
             SearchPlan::Propagation { .. } => None,
         };
         Assessment { set: self.set(), outcomes: Arc::clone(outcomes), statistics, cost }
+    }
+
+    /// Returns the assessment of the pending point from one for any set of data.
+    fn of_this_set(&self, point: &Point, known: Assessment) -> Assessment {
+        let Assessment { set, outcomes, statistics, .. } = &known;
+        match &self.plan {
+            SearchPlan::Identification(identification) if *set != self.set() => {
+                let cost = identification.cost(&self.specification, statistics, point, outcomes);
+                Assessment { set: self.set(), cost: Some(cost), ..known }
+            }
+            _ => known,
+        }
     }
 
     /// Returns the number of the set of data that the pending point is for.
@@ -337,9 +349,9 @@ impl Search {
 }
 
 impl Assessment {
-    /// Returns whether it is that of these very outcomes, for this set of data.
-    fn is_of(&self, set: u32, outcomes: &Arc<[Outcome]>) -> bool {
-        self.set == set && Arc::ptr_eq(&self.outcomes, outcomes)
+    /// Returns whether it is that of these very outcomes.
+    fn is_of(&self, outcomes: &Arc<[Outcome]>) -> bool {
+        Arc::ptr_eq(&self.outcomes, outcomes)
     }
 }
 

@@ -95,13 +95,32 @@ impl Ahead {
         self.prepared.insert(bits(point), prepared);
     }
 
-    /// Takes the complete evaluation of a point, which stays if several parts ask for it.
-    pub(crate) fn take_prepared(&mut self, point: &Point) -> Option<Prepared> {
-        let prepared = self.prepared(point)?.clone();
-        if prepared.part.is_some() {
-            self.prepared.remove(&bits(point));
+    /// Passes the complete evaluation of a point, if there is one, to a branch that asks for it; returns
+    /// whether there is. It stays for further parts if it was not computed for this one.
+    pub(crate) fn tell_prepared(&mut self, branch: usize, point: &Point) -> bool {
+        let Some(prepared) = self.prepared.get_mut(&bits(point)) else {
+            return false;
+        };
+        let Some(FollowedBranch { part, branch, .. }) = self.branches.get_mut(branch) else {
+            return false;
+        };
+        if prepared.part != Some(*part) {
+            prepared.part = None;
         }
-        Some(prepared)
+        let assessment = branch.tell(&prepared.outcomes, prepared.assessment.as_ref());
+        prepared.assessment = prepared.assessment.take().or(assessment);
+        true
+    }
+
+    /// Takes the complete evaluation of a point that the search asks for in part number `part`. It stays
+    /// if it was not computed for this part alone.
+    pub(crate) fn take_prepared(&mut self, point: &Point, part: u64) -> Option<Prepared> {
+        let prepared = self.prepared.get_mut(&bits(point))?;
+        if prepared.part == Some(part) {
+            return self.prepared.remove(&bits(point));
+        }
+        prepared.part = None;
+        Some(prepared.clone())
     }
 
     /// Drops the complete evaluations that belong only to parts before `part`.

@@ -14,7 +14,7 @@ use osteon_common::results::{Evaluation, EvaluationRole};
 use osteon_common::statistics::PointStatistics;
 
 use super::dataset_search::DatasetSearch;
-use super::{Assessment, Search, SearchPlan, same_point};
+use super::{Assessment, Search, SearchPlan};
 
 /// A part of a search, followed by itself: the search for one set of data, or, if there are several
 /// starts, from one of them. With several starts it holds no derivatives and no posterior, which
@@ -76,17 +76,7 @@ impl Search {
         Some(Branch { specification, search, evaluations: 0 })
     }
 
-    /// Returns whether part number `part` begins at `point`, and another after it, too: the searches for
-    /// all sets begin at the same points, unless something is known of each set.
-    pub fn shares_start(&self, part: u64, point: &Point) -> bool {
-        let begins_there = |part| {
-            let first = self.branch(part).and_then(|branch| branch.point());
-            first.is_some_and(|first| same_point(&first, point))
-        };
-        begins_there(part + self.starts()) && begins_there(part)
-    }
-
-    /// Saves computing the assessment of these outcomes again when they are passed to
+    /// Saves computing the assessment of these outcomes, or a part of it, again when they are passed to
     /// [`Search::tell`] next. It is ignored if they are not.
     pub fn anticipate(&mut self, assessment: Assessment) {
         self.assessment = Some(assessment);
@@ -99,23 +89,26 @@ impl Search {
 }
 
 impl Branch {
-    /// Returns the number of points whose outcomes it was given.
-    pub fn evaluations(&self) -> u64 {
-        self.evaluations
-    }
-
     /// Returns the next point, unless it has ended.
     pub fn point(&self) -> Option<Point> {
         self.search.point()
     }
 
-    /// Takes the outcomes, in index order, of the pending point. Returns its assessment, for
-    /// [`Search::anticipate`]; `None` if the branch has ended.
-    pub fn tell(&mut self, outcomes: &Arc<[Outcome]>) -> Option<Assessment> {
+    /// Takes the outcomes, in index order, of the pending point, and what another part has computed from
+    /// these very outcomes, if it is known. Returns their assessment, for [`Search::anticipate`]; `None`
+    /// if the branch has ended.
+    pub fn tell(
+        &mut self,
+        outcomes: &Arc<[Outcome]>,
+        known: Option<&Assessment>,
+    ) -> Option<Assessment> {
         let point = self.point()?;
         let Self { specification, search, evaluations } = self;
-        let statistics =
-            PointStatistics::from_outcomes(&specification.monte_carlo, &point, outcomes);
+        let known = known.filter(|known| known.is_of(outcomes));
+        let statistics = known.map_or_else(
+            || PointStatistics::from_outcomes(&specification.monte_carlo, &point, outcomes),
+            |known| known.statistics.clone(),
+        );
         let cost = search.cost(specification, &statistics, &point, outcomes);
         let row = Evaluation {
             number: *evaluations,

@@ -18,6 +18,7 @@ use crate::core::event::{Hello, Request};
 use crate::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use crate::core::sanity::sanity_check;
 
+mod ahead;
 mod checks;
 mod dispatch;
 mod fairness;

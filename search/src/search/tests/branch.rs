@@ -29,7 +29,7 @@ fn followed(mut branch: Branch) -> Vec<(Point, Arc<[Outcome]>, Assessment)> {
     let mut points = Vec::new();
     while let Some(point) = branch.point() {
         let outcomes = outcomes(&point);
-        let assessment = branch.tell(&outcomes).unwrap();
+        let assessment = branch.tell(&outcomes, None).unwrap();
         points.push((point, outcomes, assessment));
     }
     points
@@ -111,16 +111,16 @@ fn branches_after_the_answer_are_no_longer_than_their_starts() {
     assert_eq!(of_start.filter(|row| row.role.varied.is_none()).count(), branch.len());
 }
 
-/// An assessment counts only for the outcomes and the set that it is of.
+/// Of an assessment for another set only the moments are used, and nothing of one of other outcomes.
 #[test]
-fn assessments_of_other_outcomes_or_sets_are_ignored() {
+fn assessments_are_used_as_far_as_they_hold() {
     let job = JobSpecification { data: Some(groups(2)), ..by_newton(60) };
     let (plain, _) = run(&job);
     let mut search = Search::new(Arc::new(job));
     let other = {
         let mut branch = search.branch(1).unwrap();
         let outcomes = outcomes(&branch.point().unwrap());
-        (branch.tell(&outcomes).unwrap(), outcomes)
+        (branch.tell(&outcomes, None).unwrap(), outcomes)
     };
     while let Step::Evaluate(point) = search.ask() {
         search.anticipate(other.0.clone());
@@ -130,4 +130,12 @@ fn assessments_of_other_outcomes_or_sets_are_ignored() {
         search.tell(told, ERRORS);
     }
     assert_eq!(search.summary(), plain.summary());
+    // So do branches: the first is given what the second has computed.
+    let mut branch = search.branch(0).unwrap();
+    let assessed = branch.tell(&other.1, Some(&other.0)).unwrap();
+    assert_eq!(assessed.cost, plain.history()[0].cost);
+    assert_ne!(assessed.cost, other.0.cost);
+    let outcomes = outcomes(&branch.point().unwrap());
+    let assessed = branch.tell(&outcomes, Some(&other.0)).unwrap();
+    assert_eq!(assessed.cost, plain.history()[1].cost);
 }

@@ -9,8 +9,6 @@
 //! [`refresh`] sees to it that a job with further parts always has something to send, and that no
 //! part begins before it is needed for that.
 
-use std::sync::Arc;
-
 use osteon_common::parameters::Point;
 use osteon_search::same_point;
 
@@ -56,11 +54,14 @@ pub(crate) fn refresh(state: &mut State, id: JobId) {
     }
 }
 
-/// Keeps the outcomes of a point that a job's search has asked for, if later parts will ask for the
-/// same: the searches for all groups begin at one point.
-pub(crate) fn keep_start(job: &mut Job, point: &Point, prepared: Prepared) {
-    if job.search.evaluations() == 0 && job.search.shares_start(0, point) {
-        job.ahead.prepare(point, Prepared { part: None, ..prepared });
+/// Keeps the outcomes of a point that a job's search has asked for, if a branch waits for them: the
+/// searches for all groups begin at the same points.
+pub(crate) fn keep_if_awaited(job: &mut Job, point: &Point, prepared: Prepared) {
+    let waits = |it: &FollowedBranch| {
+        it.evaluation.is_none() && it.branch.point().is_some_and(|at| same_point(&at, point))
+    };
+    if job.ahead.branches.iter().any(waits) {
+        job.ahead.prepare(point, prepared);
     }
 }
 
@@ -82,14 +83,10 @@ pub(crate) fn settle(turn: &mut Turn, id: JobId, attempt: u64) {
     let Some(evaluation) = followed.evaluation.take() else {
         return;
     };
-    let assessment = followed.branch.tell(&outcomes);
+    let assessment = followed.branch.tell(&outcomes, None);
     let part = followed.part;
-    let is_first = followed.branch.evaluations() == 1;
-    let is_shared = is_first && job.search.shares_start(part, &evaluation.point);
-    let of_part = (!is_shared).then_some(part);
     let workers = evaluation.workers.into_iter().collect();
-    let prepared =
-        Prepared { part: of_part, outcomes, estimated_error, workers, assessment };
+    let prepared = Prepared { part: Some(part), outcomes, estimated_error, workers, assessment };
     job.ahead.prepare(&evaluation.point, prepared);
     begin(turn.state, id, part);
     refresh(turn.state, id);
@@ -112,6 +109,22 @@ pub(crate) fn drop_before(turn: &mut Turn, id: JobId, part: u64) {
     let passed = job.ahead.branches.extract_if(.., |it| it.part < part);
     let gone: Vec<u64> = passed.filter_map(|it| Some(it.evaluation?.attempt)).collect();
     revoke(turn, id, &gone);
+}
+
+/// Drops the evaluation of the last branch of the job that has most of them; returns whether there is
+/// one. The branch begins again when there is room.
+pub(crate) fn drop_last(turn: &mut Turn) -> bool {
+    let count = |id: &JobId| {
+        let evaluations = turn.state.jobs.get(id)?.ahead.evaluations().count();
+        (evaluations > 0).then_some((evaluations, *id))
+    };
+    let Some((_, id)) = turn.state.active.iter().filter_map(count).max() else {
+        return false;
+    };
+    let branches = turn.state.jobs.get_mut(&id).map(|job| &mut job.ahead.branches);
+    let last = branches.into_iter().flatten().rev().find_map(|it| it.evaluation.take());
+    revoke(turn, id, &Vec::from_iter(last.map(|evaluation| evaluation.attempt)));
+    true
 }
 
 /// Drops everything that may contain answers of a banned worker.
@@ -175,9 +188,7 @@ fn begin(state: &mut State, id: JobId, part: u64) -> bool {
             job.ahead.branches.remove(at);
             return false;
         };
-        if let Some(known) = job.ahead.prepared(&point) {
-            let outcomes = Arc::clone(&known.outcomes);
-            job.ahead.branches[at].branch.tell(&outcomes);
+        if job.ahead.tell_prepared(at, &point) {
             continue;
         }
         let realizations = job.record.specification.monte_carlo.realizations;

@@ -95,17 +95,19 @@ pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     retain(turn, id, |evaluation| !contributed(evaluation));
 }
 
-/// Drops the newest speculative evaluations until the limit on realizations in memory is kept.
+/// Drops the newest speculative evaluations, then those of the last branches, until the limit on
+/// realizations in memory is kept.
 pub(crate) fn drop_excess(turn: &mut Turn) {
     while turn.state.realizations() > turn.state.config.active_realizations_max {
         let newest = |id: &JobId| {
             let evaluations = &turn.state.jobs.get(id)?.speculation.evaluations;
             evaluations.last().map(|last| (evaluations.len(), *id, last.attempt))
         };
-        let Some((_, job, attempt)) = turn.state.active.iter().filter_map(newest).max() else {
+        if let Some((_, job, attempt)) = turn.state.active.iter().filter_map(newest).max() {
+            retain(turn, job, |evaluation| evaluation.attempt != attempt);
+        } else if !ahead::drop_last(turn) {
             return;
-        };
-        retain(turn, job, |evaluation| evaluation.attempt != attempt);
+        }
     }
 }
 
@@ -116,6 +118,8 @@ fn speculates(config: &Config, job: &Job) -> bool {
         && specification.kind == JobKind::Identification
         && specification.monte_carlo.realizations <= REALIZATIONS_MAX
         && !job.cancelled
+        // Other parts of the search are certain work.
+        && job.ahead.branches.is_empty()
 }
 
 /// Turns the speculative batches of an evaluation into ordinary ones.

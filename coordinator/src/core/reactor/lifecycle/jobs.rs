@@ -45,7 +45,7 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
         workers: workers.clone(),
         assessment: None,
     };
-    ahead::keep_start(job, &point, prepared);
+    ahead::keep_if_awaited(job, &point, prepared);
     let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
     turn.effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
     let outcomes = record.outcomes.clone();
@@ -198,7 +198,7 @@ fn store_prepared(turn: &mut Turn, id: JobId) -> bool {
     while let Step::Evaluate(point) = after.ask()
         && records.len() < records_max
         && realizations < realizations_max
-        && let Some(prepared) = job.ahead.take_prepared(&point)
+        && let Some(prepared) = job.ahead.take_prepared(&point, after.part())
     {
         let Prepared { outcomes, estimated_error, workers, assessment, .. } = prepared;
         realizations += outcomes.len();
