@@ -21,6 +21,7 @@ pub(crate) mod rate;
 pub mod reactor;
 pub(crate) mod realization_time;
 pub mod sanity;
+pub(crate) mod saved;
 pub(crate) mod service_order;
 pub(crate) mod snapshot;
 pub mod state;

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::outcome::Outcome;
+use osteon_common::outcome::{Outcome, RealizationResult};
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, Evaluation, Moments};
 use osteon_common::version::Program;
@@ -64,6 +64,28 @@ pub struct EvaluationRecord {
     pub estimated_error: Option<EstimatedError>,
     /// All workers whose answers are in it.
     pub workers: BTreeSet<WorkerName>,
+}
+
+/// Results that an evaluation has received so far.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartRecord {
+    /// The job.
+    pub job: JobId,
+    /// The point of the evaluation.
+    pub point: Point,
+    /// The results.
+    pub pieces: Vec<Piece>,
+}
+
+/// Results of consecutive indices that one worker gave.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Piece {
+    /// The first index.
+    pub first: u64,
+    /// The worker.
+    pub by: WorkerName,
+    /// The results in index order.
+    pub results: Vec<RealizationResult>,
 }
 
 /// A worker that was banned for wrong answers.
@@ -206,6 +228,19 @@ pub trait Store {
         record: &EvaluationRecord,
         is_last: bool,
     ) -> Result<(), StoreError>;
+
+    /// Keeps results of an evaluation until the evaluation at the same point is stored, or its job ends
+    /// or begins again.
+    ///
+    /// # Errors
+    /// When they are not durable.
+    fn put_part(&mut self, record: &PartRecord) -> Result<(), StoreError>;
+
+    /// Returns the results that are kept for a job, without damaged ones.
+    ///
+    /// # Errors
+    /// When they cannot be read.
+    fn parts(&mut self, job: JobId) -> Result<Vec<PartRecord>, StoreError>;
 
     /// Makes evaluations of a job with consecutive numbers durable, and deletes all evaluations after
     /// them.

@@ -7,13 +7,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::Duration;
 
 use osteon_common::outcome::Outcome;
-use osteon_common::parameters::{PARAMETERS, Point};
+use osteon_common::parameters::Point;
 use osteon_common::results::EstimatedError;
 use osteon_search::{Assessment, Branch, same_point};
 
 use crate::core::evaluation::PendingEvaluation;
+use crate::core::saved::{PointBits, point_bits};
 use crate::core::worker_name::WorkerName;
 
 /// What a job computes before its search asks for it.
@@ -49,10 +51,9 @@ pub(crate) struct Prepared {
     pub(crate) workers: BTreeSet<WorkerName>,
     /// Its moments and cost in that part.
     pub(crate) assessment: Option<Assessment>,
+    /// The evaluation, while its results are not in the store, and the time when it was complete.
+    pub(crate) unsaved: Option<(Box<PendingEvaluation>, Duration)>,
 }
-
-/// A point, to be compared to the bit.
-type PointBits = [u64; PARAMETERS];
 
 impl Ahead {
     /// Returns the evaluations under way.
@@ -82,7 +83,14 @@ impl Ahead {
 
     /// Returns the complete evaluation of a point.
     pub(crate) fn prepared(&self, point: &Point) -> Option<&Prepared> {
-        self.prepared.get(&bits(point))
+        self.prepared.get(&point_bits(point))
+    }
+
+    /// Takes the complete evaluations that have waited since `before` and are not in the store.
+    pub(crate) fn take_unsaved(&mut self, before: Duration) -> Vec<PendingEvaluation> {
+        let old = |(_, complete): &mut (Box<PendingEvaluation>, Duration)| *complete <= before;
+        let prepared = self.prepared.values_mut();
+        prepared.filter_map(|prepared| prepared.unsaved.take_if(old)).map(|it| *it.0).collect()
     }
 
     /// Returns the complete evaluations.
@@ -92,13 +100,35 @@ impl Ahead {
 
     /// Keeps the complete evaluation of a point.
     pub(crate) fn prepare(&mut self, point: &Point, prepared: Prepared) {
-        self.prepared.insert(bits(point), prepared);
+        self.prepared.insert(point_bits(point), prepared);
+    }
+
+    /// Passes the evaluation of a part's branch to the branch, and keeps it for the search, if it is
+    /// complete; returns whether it is.
+    pub(crate) fn take_in(&mut self, part: u64, now: Duration) -> bool {
+        let followed = self.branches.iter_mut().find(|followed| followed.part == part);
+        let Some(FollowedBranch { branch, evaluation, .. }) = followed else {
+            return false;
+        };
+        let Some(complete) = evaluation.take_if(|evaluation| evaluation.is_settled()) else {
+            return false;
+        };
+        let Some((outcomes, estimated_error)) = complete.complete() else {
+            return false;
+        };
+        let assessment = branch.tell(&outcomes, None);
+        let (point, part) = (complete.point, Some(part));
+        let workers = complete.workers.iter().cloned().collect();
+        let unsaved = (!complete.unsaved.is_empty()).then(|| (Box::new(complete), now));
+        let prepared = Prepared { part, outcomes, estimated_error, workers, assessment, unsaved };
+        self.prepare(&point, prepared);
+        true
     }
 
     /// Passes the complete evaluation of a point, if there is one, to a branch that asks for it; returns
     /// whether there is. It stays for further parts if it was not computed for this one.
     pub(crate) fn tell_prepared(&mut self, branch: usize, point: &Point) -> bool {
-        let Some(prepared) = self.prepared.get_mut(&bits(point)) else {
+        let Some(prepared) = self.prepared.get_mut(&point_bits(point)) else {
             return false;
         };
         let Some(FollowedBranch { part, branch, .. }) = self.branches.get_mut(branch) else {
@@ -115,12 +145,12 @@ impl Ahead {
     /// Takes the complete evaluation of a point that the search asks for in part number `part`. It stays
     /// if it was not computed for this part alone.
     pub(crate) fn take_prepared(&mut self, point: &Point, part: u64) -> Option<Prepared> {
-        let prepared = self.prepared.get_mut(&bits(point))?;
+        let prepared = self.prepared.get_mut(&point_bits(point))?;
         if prepared.part == Some(part) {
-            return self.prepared.remove(&bits(point));
+            return self.prepared.remove(&point_bits(point));
         }
         prepared.part = None;
-        Some(prepared.clone())
+        Some(Prepared { unsaved: None, ..prepared.clone() })
     }
 
     /// Drops the complete evaluations that belong only to parts before `part`.
@@ -134,8 +164,4 @@ impl Ahead {
         self.next_part = 0;
         self.prepared.retain(|_, prepared| !prepared.workers.contains(name));
     }
-}
-
-fn bits(point: &Point) -> PointBits {
-    point.0.map(f64::to_bits)
 }

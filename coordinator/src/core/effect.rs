@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::core::close_reason::CloseReason;
 use crate::core::ids::{BatchId, JobId, LeaseId, ReplyId, WorkerId};
 use crate::core::notice::Notice;
-use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord};
+use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord};
 
 /// An action for the shell.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,6 +114,9 @@ pub enum Record {
     /// Complete evaluations of a job with consecutive numbers, at least one. Evaluations stored after
     /// them are deleted.
     Evaluations(Vec<EvaluationRecord>),
+    /// Results of an evaluation that is not complete, or that the search has not asked for. They are
+    /// only a help: nothing waits for them, and they are not part of any result.
+    Part(PartRecord),
     /// The end of a job.
     End {
         /// The end.
@@ -137,6 +140,7 @@ impl Record {
                 let (job, number) = last.unwrap_or((JobId(0), 0));
                 (job, RecordKey::Evaluation(number))
             }
+            Self::Part(record) => (record.job, RecordKey::Part),
             Self::End { end, .. } => (end.job, RecordKey::End),
             Self::Ban(record) => (record.job, RecordKey::Ban(record.number)),
         }
@@ -150,6 +154,8 @@ pub enum RecordKey {
     Job,
     /// The evaluation with this number.
     Evaluation(u64),
+    /// Results of an evaluation.
+    Part,
     /// The end of the job.
     End,
     /// The ban with this number, of a worker that was found in this job.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
+use std::time::Duration;
 
 use osteon_common::outcome::{Outcome, RealizationResult, encode};
 use osteon_common::parameters::Point;
@@ -69,6 +70,10 @@ pub struct PendingEvaluation {
     pub(crate) audits_out: usize,
     /// Undecided disputes.
     pub(crate) disputes: Vec<Dispute>,
+    /// Indices that were filled since its results were last saved.
+    pub(crate) unsaved: Vec<Indices>,
+    /// Time from which on its results are saved; `None` until the next tick.
+    pub(crate) save_at: Option<Duration>,
     /// A worker was lost over it. While it is speculative, no further worker is risked for it until
     /// the search asks for it.
     pub(crate) has_crashed_worker: bool,
@@ -93,8 +98,28 @@ impl PendingEvaluation {
             audits: VecDeque::new(),
             audits_out: 0,
             disputes: Vec::new(),
+            unsaved: Vec::new(),
+            save_at: None,
             has_crashed_worker: false,
         }
+    }
+
+    /// Returns the result of an index, if it is filled, and the worker that gave it.
+    pub(crate) fn result(&self, index: u64) -> Option<(RealizationResult, &WorkerName)> {
+        let index = usize::try_from(index).ok()?;
+        let result = (*self.results.get(index)?)?;
+        let owner = usize::try_from(*self.owners.get(index)?).ok()?;
+        Some((result, self.workers.get(owner)?))
+    }
+
+    /// Queues exactly the indices that are not filled: nothing of it has been sent yet.
+    pub(crate) fn queue_unfilled(&mut self) {
+        self.queue = runs(&self.results, Option::is_none).into();
+    }
+
+    /// Counts all results as not saved.
+    pub(crate) fn save_again(&mut self) {
+        self.unsaved = runs(&self.results, Option::is_some);
     }
 
     /// Returns the number of realizations that have an outcome.
@@ -167,6 +192,10 @@ impl PendingEvaluation {
             self.workers.len() - 1
         });
         let owner = u32::try_from(place).unwrap_or(u32::MAX);
+        match self.unsaved.last_mut() {
+            Some(last) if last.end() == indices.first => last.count += indices.count,
+            _ => self.unsaved.push(indices),
+        }
         let first = usize::try_from(indices.first).unwrap_or(usize::MAX);
         let results = self.results.iter_mut().zip(&mut self.owners).skip(first);
         for ((result, owned), solved) in results.zip(solved) {
@@ -246,4 +275,21 @@ impl PendingEvaluation {
         let errors = successes.map(|solved| solved.estimated_error).collect();
         Some((outcomes?, quantile::estimated_error(errors)))
     }
+}
+
+/// Returns the runs of consecutive indices whose results satisfy `of`.
+fn runs(
+    results: &[Option<RealizationResult>],
+    of: impl Fn(&Option<RealizationResult>) -> bool,
+) -> Vec<Indices> {
+    let mut found = Vec::new();
+    let mut first = 0;
+    for run in results.chunk_by(|one, other| of(one) == of(other)) {
+        let count = run.len() as u64;
+        if run.first().is_some_and(&of) {
+            found.push(Indices { first, count });
+        }
+        first += count;
+    }
+    found
 }

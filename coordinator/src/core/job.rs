@@ -8,11 +8,13 @@ use osteon_common::parameters::Point;
 use osteon_proto::specification;
 use prost::Message as _;
 
+use crate::config::Config;
 use crate::core::ahead::Ahead;
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{BatchId, ReplyId};
 use crate::core::rate::Rate;
 use crate::core::realization_time::RealizationTime;
+use crate::core::saved::SavedParts;
 use crate::core::worker_name::WorkerName;
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
 use osteon_search::Search;
@@ -29,6 +31,8 @@ pub(crate) struct Job {
     pub(crate) ahead: Ahead,
     /// Speculative evaluations of points that its search may ask for next.
     pub(crate) speculation: Speculation,
+    /// Results of evaluations that have not begun yet, from an earlier coordinator.
+    pub(crate) saved: SavedParts,
     /// Number of its evaluations in the store. Those that the search has not received yet are read
     /// before it continues.
     pub(crate) stored: u64,
@@ -69,6 +73,7 @@ impl Job {
             search: Search::new(record.specification.clone()),
             ahead: Ahead::default(),
             speculation: Speculation::default(),
+            saved: SavedParts::default(),
             record,
             stage,
             stored,
@@ -86,6 +91,21 @@ impl Job {
             pending_replies: Vec::new(),
             store_retry: None,
         }
+    }
+
+    /// Creates the evaluation of a point, with the results that an earlier coordinator saved.
+    pub(crate) fn new_evaluation(
+        &mut self,
+        number: u64,
+        attempt: u64,
+        point: Point,
+        config: &Config,
+    ) -> PendingEvaluation {
+        let realizations = self.record.specification.monte_carlo.realizations;
+        let mut evaluation = PendingEvaluation::new(number, attempt, point, realizations);
+        let audits = (&config.audit_key, config.audit_fraction);
+        self.saved.restore(&mut evaluation, self.record.job, audits);
+        evaluation
     }
 
     /// Returns the evaluation that the search asked for, while it is under way.

@@ -70,7 +70,10 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::StoreFailed { job, key, error } => records::store_failed(turn, job, key, error),
         Event::Read { job, number, found } => replay::read(turn, job, number, found),
         Event::Pruned { reply_id, jobs, outcome } => prune::pruned(turn, reply_id, jobs, outcome),
-        Event::Drain => workers::drain_all(turn),
+        Event::Drain => {
+            ticks::save_parts(turn, true);
+            workers::drain_all(turn);
+        }
     }
 }
 
@@ -82,6 +85,7 @@ fn tick(turn: &mut Turn) {
     dispatch::overdue::tick(turn);
     checks::give_up(turn);
     if !turn.state.draining {
+        ticks::save_parts(turn, false);
         ticks::fail_poisoned(turn);
         ticks::store_again(turn);
         bans::store_again(turn);

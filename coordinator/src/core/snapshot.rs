@@ -46,9 +46,7 @@ pub(crate) fn job_snapshot(state: &State, id: JobId, now: Duration) -> Option<Jo
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = evaluation.filled();
         }
-        Stage::StoringEvaluation { .. }
-        | Stage::StoringPrepared { .. }
-        | Stage::StoringEnd(_) => {
+        Stage::StoringEvaluation { .. } | Stage::StoringPrepared { .. } | Stage::StoringEnd(_) => {
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = realizations;
         }

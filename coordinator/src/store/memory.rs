@@ -3,9 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use osteon_search::Summary;
+use osteon_search::{Summary, same_point};
 
-use super::{BanRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob};
+use super::{
+    BanRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store, StoreError, StoredJob,
+};
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
 
@@ -18,6 +20,7 @@ struct StoreContent {
     jobs: BTreeMap<JobId, StoredJob>,
     last_deleted_job: Option<JobId>,
     evaluations: BTreeMap<(JobId, u64), EvaluationRecord>,
+    parts: Vec<PartRecord>,
     summaries: BTreeMap<JobId, Summary>,
     bans: BTreeMap<u64, BanRecord>,
 }
@@ -59,6 +62,7 @@ impl Store for MemoryStore {
     fn reset_job(&mut self, job: JobId, fingerprint: &str) -> Result<(), StoreError> {
         let mut content = self.content();
         content.evaluations.retain(|(of, _), _| *of != job);
+        content.parts.retain(|part| part.job != job);
         if let Some(stored) = content.jobs.get_mut(&job) {
             fingerprint.clone_into(&mut stored.record.fingerprint);
         }
@@ -79,15 +83,26 @@ impl Store for MemoryStore {
         let mut content = self.content();
         let EvaluationRecord { job, number: last, .. } = *record;
         content.evaluations.insert((job, last), record.clone());
+        content.parts.retain(|part| part.job != job || !same_point(&part.point, &record.point));
         if is_last {
             content.evaluations.retain(|(of, number), _| *of != job || *number <= last);
         }
         Ok(())
     }
 
+    fn put_part(&mut self, record: &PartRecord) -> Result<(), StoreError> {
+        self.content().parts.push(record.clone());
+        Ok(())
+    }
+
+    fn parts(&mut self, job: JobId) -> Result<Vec<PartRecord>, StoreError> {
+        Ok(self.content().parts.iter().filter(|part| part.job == job).cloned().collect())
+    }
+
     fn finish_job(&mut self, end: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
         let mut content = self.content();
         content.summaries.insert(end.job, summary.clone());
+        content.parts.retain(|part| part.job != end.job);
         if let Some(job) = content.jobs.get_mut(&end.job) {
             job.end = Some(end.clone());
         }
@@ -104,6 +119,7 @@ impl Store for MemoryStore {
         content.jobs.retain(|job, _| !jobs.contains(job));
         content.summaries.retain(|job, _| !jobs.contains(job));
         content.evaluations.retain(|(job, _), _| !jobs.contains(job));
+        content.parts.retain(|part| !jobs.contains(&part.job));
         Ok(())
     }
 

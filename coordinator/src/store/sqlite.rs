@@ -18,8 +18,8 @@ use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::{
-    BanRecord, BetweenPieces, DamagedRecord, EndRecord, EvaluationRecord, JobRecord, Store,
-    StoreError, StoredJob,
+    BanRecord, BetweenPieces, DamagedRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord,
+    Store, StoreError, StoredJob,
 };
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
@@ -29,6 +29,7 @@ mod backup;
 mod columns;
 mod job_row;
 mod opening;
+mod parts;
 mod schema;
 mod store_trait;
 mod summary;
@@ -206,7 +207,7 @@ impl SqliteStore {
     /// Deletes jobs and all their records; their identifiers are never assigned again.
     fn remove_jobs(&self, jobs: &[JobId]) -> rusqlite::Result<()> {
         let transaction = self.connection.unchecked_transaction()?;
-        for table in ["summary", "ending", "evaluation"] {
+        for table in ["summary", "ending", "evaluation", "part"] {
             let sql = format!("DELETE FROM {table} WHERE job = ?1");
             let mut delete = transaction.prepare(&sql)?;
             for job in jobs {
@@ -269,6 +270,7 @@ impl Store for &SqliteStore {
         let reset_job = || -> rusqlite::Result<()> {
             let transaction = self.connection.unchecked_transaction()?;
             transaction.execute("DELETE FROM evaluation WHERE job = ?1", params![job.0])?;
+            parts::delete_of(&transaction, job)?;
             let encoded: Vec<u8> = transaction.query_row(
                 "SELECT specification FROM job WHERE id = ?1",
                 params![job.0],
@@ -325,10 +327,11 @@ impl Store for &SqliteStore {
             evaluation_checksum(job, number, &point, &outcomes, errors.as_deref(), &workers);
         let sql = "INSERT OR REPLACE INTO evaluation (job, number, point, outcomes, checksum,
                    estimated_error, workers) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
-        let values = params![job.0, number, point, outcomes, checksum, errors, workers];
+        let values = params![job.0, number, &point, outcomes, checksum, errors, workers];
         let put = || -> rusqlite::Result<()> {
             let transaction = self.connection.unchecked_transaction()?;
             transaction.execute(sql, values)?;
+            parts::delete_at(&transaction, job, &point)?;
             if is_last {
                 let sql = "DELETE FROM evaluation WHERE job = ?1 AND number > ?2";
                 transaction.execute(sql, params![job.0, number])?;
@@ -336,6 +339,19 @@ impl Store for &SqliteStore {
             transaction.commit()
         };
         put().map_err(|source| self.refused(source))
+    }
+
+    fn put_part(&mut self, record: &PartRecord) -> Result<(), StoreError> {
+        let put = || -> rusqlite::Result<()> {
+            let transaction = self.connection.unchecked_transaction()?;
+            parts::put(&transaction, record)?;
+            transaction.commit()
+        };
+        put().map_err(|source| self.refused(source))
+    }
+
+    fn parts(&mut self, job: JobId) -> Result<Vec<PartRecord>, StoreError> {
+        parts::of_job(&self.connection, job).map_err(|source| self.refused(source))
     }
 
     fn finish_job(&mut self, record: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
@@ -363,6 +379,7 @@ impl Store for &SqliteStore {
             let transaction = self.connection.unchecked_transaction()?;
             transaction.execute(sql, values)?;
             summary::put(&transaction, record.job, summary)?;
+            parts::delete_of(&transaction, record.job)?;
             transaction.commit()
         };
         finish().map_err(|source| self.refused(source))

@@ -165,6 +165,7 @@ fn put(store: &mut dyn Store, record: &Record) -> Event {
         Record::Job(record) => store.put_job(record),
         Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
         Record::Evaluations(records) => store.put_evaluations(records),
+        Record::Part(record) => store.put_part(record),
         Record::End { end, summary } => store.finish_job(end, summary),
         Record::Ban(record) => ban(store, record),
     };

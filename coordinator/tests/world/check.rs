@@ -94,10 +94,7 @@ impl World {
         let several = Search::new(Arc::new(specification.clone())).parts() > 1;
         let wanted = self.config.speculation || (self.config.ahead && several);
         // On a path that results from a wrong answer a point may be asked for sooner.
-        assert!(
-            ahead == 0 || wanted || lied,
-            "nobody wanted points to be computed ahead"
-        );
+        assert!(ahead == 0 || wanted || lied, "nobody wanted points to be computed ahead");
         self.counts.ahead += ahead;
         self.counts.dropped += u64::from(self.config.speculation) * sent.len() as u64;
     }

@@ -35,6 +35,8 @@ pub(crate) struct Counts {
     pub(crate) repaired: u64,
     /// Evaluations of other groups and starts that were complete when their search asked for them.
     pub(crate) prepared: u64,
+    /// Records of results of incomplete evaluations.
+    pub(crate) saved: u64,
     /// Points on the path of a search that were computed speculatively.
     pub(crate) ahead: u64,
     /// Points that were computed speculatively and are not on the path of their search.
@@ -73,6 +75,7 @@ impl Counts {
         self.remembered += other.remembered;
         self.repaired += other.repaired;
         self.prepared += other.prepared;
+        self.saved += other.saved;
         self.ahead += other.ahead;
         self.dropped += other.dropped;
         self.pruned += other.pruned;

@@ -40,7 +40,7 @@ impl World {
                 self.counts.prepared += records.len() as u64;
                 records.iter().for_each(|record| self.look_at_evaluation(record, true));
             }
-            Record::Job(_) => {}
+            Record::Job(_) | Record::Part(_) => {}
         }
     }
 
@@ -78,6 +78,7 @@ impl World {
             Record::Job(record) => {
                 self.seeds.insert(record.job, record.specification.monte_carlo.seed);
             }
+            Record::Part(_) => self.counts.saved += 1,
             Record::End { .. } | Record::Ban(_) => {}
         }
         fake::written(&mut self.store, record)

@@ -98,7 +98,7 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
         return false;
     };
     turn.state.last_served = Some(job);
-    ahead::refresh(turn.state, job);
+    ahead::refresh(turn, job);
     let assignment = Assignment { job, attempt, indices };
     let batch = batches::send(turn, worker, assignment, Purpose::Fill);
     if let Some(batch) = batch {

@@ -28,6 +28,7 @@ mod notices;
 mod overdue;
 mod prune;
 mod replay;
+mod saved;
 mod speculation;
 mod workers;
 
@@ -79,8 +80,10 @@ impl Rig {
         if let Err(insane) = sanity_check(&self.state) {
             panic!("{insane}\n{:#?}", self.state);
         }
-        // Notices for the log have tests of their own.
-        let acts = effects.iter().filter(|effect| !matches!(effect, Effect::Note(_)));
+        // Notices for the log, and what is saved of incomplete evaluations, have tests of their own.
+        let aside =
+            |effect: &&Effect| matches!(effect, Effect::Note(_) | Effect::Store(Record::Part(_)));
+        let acts = effects.iter().filter(|effect| !aside(effect));
         acts.map(described).collect()
     }
 
@@ -223,6 +226,10 @@ fn described(effect: &Effect) -> String {
         Effect::Store(Record::Evaluations(records)) => {
             let numbers: Vec<String> = records.iter().map(|it| it.number.to_string()).collect();
             format!("store job {} evaluations {}", records[0].job, numbers.join(" "))
+        }
+        Effect::Store(Record::Part(record)) => {
+            let count: usize = record.pieces.iter().map(|piece| piece.results.len()).sum();
+            format!("save {count} of job {}", record.job)
         }
         Effect::Store(Record::Ban(record)) => {
             format!("store ban {}: {} {}", record.number, record.worker, record.reason)

@@ -167,7 +167,7 @@ pub(super) fn pack_point(point: Point) -> Vec<u8> {
     point.0.into_iter().take(count).flat_map(f64::to_le_bytes).collect()
 }
 
-fn unpack(point: &[u8]) -> Option<Point> {
+pub(super) fn unpack(point: &[u8]) -> Option<Point> {
     let (values, rest) = point.as_chunks::<8>();
     let values: Vec<f64> = values.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
     let of_bone = || <[f64; BONE_PARAMETERS]>::try_from(values.as_slice()).map(Point::of_bone);
@@ -178,18 +178,22 @@ fn unpack(point: &[u8]) -> Option<Point> {
 /// Packs worker names, one line each: the process, a slash and the number that it drew in
 /// hexadecimal, a space, the host.
 pub(super) fn pack_workers(workers: &BTreeSet<WorkerName>) -> String {
-    let line = |worker: &WorkerName| {
-        format!("{}/{:x} {}", worker.process(), worker.instance(), worker.host())
-    };
-    workers.iter().map(line).collect::<Vec<_>>().join("\n")
+    workers.iter().map(pack_worker).collect::<Vec<_>>().join("\n")
+}
+
+/// Packs one worker name, as a line.
+pub(super) fn pack_worker(worker: &WorkerName) -> String {
+    format!("{}/{:x} {}", worker.process(), worker.instance(), worker.host())
+}
+
+/// Returns the worker name of a line.
+pub(super) fn unpack_worker(line: &str) -> Option<WorkerName> {
+    let (process, host) = line.split_once(' ')?;
+    let (process, drawn) = process.split_once('/')?;
+    let instance = u64::from_str_radix(drawn, 16).ok()?;
+    Some(WorkerName::new(host, process.parse().ok()?, instance))
 }
 
 fn unpack_workers(packed: &str) -> Option<BTreeSet<WorkerName>> {
-    let worker = |line: &str| {
-        let (process, host) = line.split_once(' ')?;
-        let (process, drawn) = process.split_once('/')?;
-        let instance = u64::from_str_radix(drawn, 16).ok()?;
-        Some(WorkerName::new(host, process.parse().ok()?, instance))
-    };
-    packed.split('\n').filter(|line| !line.is_empty()).map(worker).collect()
+    packed.split('\n').filter(|line| !line.is_empty()).map(unpack_worker).collect()
 }

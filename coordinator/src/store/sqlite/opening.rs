@@ -12,6 +12,7 @@ use osteon_proto::identity::host_name;
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
+use super::parts;
 use super::schema::SCHEMA;
 use crate::store::StoreError;
 
@@ -200,6 +201,7 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
         transaction.execute("INSERT INTO format VALUES (?1)", [FORMAT])?;
         transaction.execute_batch(SCHEMA)?;
     }
+    transaction.execute_batch(parts::TABLE)?;
     transaction.commit()
 }
 

@@ -9,7 +9,8 @@ use super::SqliteStore;
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
 use crate::store::{
-    BanRecord, BetweenPieces, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
+    BanRecord, BetweenPieces, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store,
+    StoreError, StoredJob,
 };
 
 impl Store for SqliteStore {
@@ -43,6 +44,14 @@ impl Store for SqliteStore {
         is_last: bool,
     ) -> Result<(), StoreError> {
         (&*self).put_evaluation(record, is_last)
+    }
+
+    fn put_part(&mut self, record: &PartRecord) -> Result<(), StoreError> {
+        (&*self).put_part(record)
+    }
+
+    fn parts(&mut self, job: JobId) -> Result<Vec<PartRecord>, StoreError> {
+        (&*self).parts(job)
     }
 
     fn finish_job(&mut self, end: &EndRecord, summary: &Summary) -> Result<(), StoreError> {

@@ -16,6 +16,7 @@ use super::opening::{FILE, Journal, open_file};
 use super::*;
 
 mod damage;
+mod parts;
 
 pub(super) fn job(id: u64) -> JobRecord {
     let mut parameters = Range::of_bone(

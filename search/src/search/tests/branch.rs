@@ -16,11 +16,8 @@ fn groups(count: usize) -> Data {
 
 /// The moments of fifty velocities.
 fn fifty() -> Data {
-    let measurements = Measurements::Moments {
-        mean: 3900.0,
-        coefficient_of_variation: 0.03,
-        count: Some(50),
-    };
+    let measurements =
+        Measurements::Moments { mean: 3900.0, coefficient_of_variation: 0.03, count: Some(50) };
     Data { measurements, ..Data::from_moments(3900.0, 0.03) }
 }
 

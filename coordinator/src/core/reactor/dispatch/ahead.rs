@@ -19,13 +19,12 @@ use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{BatchId, JobId};
 use crate::core::job::{Job, Stage};
 use crate::core::reactor::turn::Turn;
-use crate::core::state::State;
 use crate::core::worker_name::WorkerName;
 
 /// Begins evaluations of further parts of a job's search until one waits to be sent.
-pub(crate) fn refresh(state: &mut State, id: JobId) {
-    while let Some(job) = state.jobs.get_mut(&id) {
-        if !state.config.ahead || !computes(job) || job.ahead.has_queue() {
+pub(crate) fn refresh(turn: &mut Turn, id: JobId) {
+    while let Some(job) = turn.state.jobs.get_mut(&id) {
+        if !turn.state.config.ahead || !computes(job) || job.ahead.has_queue() {
             return;
         }
         job.ahead.next_part = job.ahead.next_part.max(job.search.part() + 1);
@@ -34,11 +33,11 @@ pub(crate) fn refresh(state: &mut State, id: JobId) {
             let waits = |it: &FollowedBranch| it.part >= part && it.evaluation.is_none();
             let parts = job.ahead.branches.iter().filter(|it| waits(it)).map(|it| it.part);
             let parts: Vec<u64> = parts.collect();
-            if parts.into_iter().any(|part| begin(state, id, part)) {
+            if parts.into_iter().any(|part| begin(turn, id, part)) {
                 return;
             }
         }
-        let Some(job) = state.jobs.get_mut(&id) else {
+        let Some(job) = turn.state.jobs.get_mut(&id) else {
             return;
         };
         // A branch that waits for a point, or for room, shows that the next would wait, too.
@@ -73,23 +72,13 @@ pub(crate) fn settle(turn: &mut Turn, id: JobId, attempt: u64) {
     let of_attempt = |it: &&mut FollowedBranch| {
         it.evaluation.as_ref().is_some_and(|evaluation| evaluation.attempt == attempt)
     };
-    let Some(followed) = job.ahead.branches.iter_mut().find(of_attempt) else {
+    let Some(part) = job.ahead.branches.iter_mut().find(of_attempt).map(|it| it.part) else {
         return;
     };
-    let complete = followed.evaluation.as_ref().and_then(PendingEvaluation::complete);
-    let Some((outcomes, estimated_error)) = complete else {
-        return;
-    };
-    let Some(evaluation) = followed.evaluation.take() else {
-        return;
-    };
-    let assessment = followed.branch.tell(&outcomes, None);
-    let part = followed.part;
-    let workers = evaluation.workers.into_iter().collect();
-    let prepared = Prepared { part: Some(part), outcomes, estimated_error, workers, assessment };
-    job.ahead.prepare(&evaluation.point, prepared);
-    begin(turn.state, id, part);
-    refresh(turn.state, id);
+    if job.ahead.take_in(part, turn.now) {
+        begin(turn, id, part);
+        refresh(turn, id);
+    }
 }
 
 /// Gives a job's search the evaluation of the point that it asks for, if one is under way.
@@ -172,13 +161,13 @@ fn computes(job: &Job) -> bool {
 }
 
 /// Begins the evaluation of the pending point of a branch. Points that are known already are passed
-/// to it first; a branch that has ended is removed. Returns whether an evaluation has begun.
-fn begin(state: &mut State, id: JobId, part: u64) -> bool {
+/// to it first; a branch that has ended is removed. Returns whether realizations wait to be sent.
+fn begin(turn: &mut Turn, id: JobId, part: u64) -> bool {
     loop {
-        let attempt = state.new_attempt();
-        let realizations_max = state.config.active_realizations_max;
-        let in_memory = state.realizations();
-        let Some(job) = state.jobs.get_mut(&id) else {
+        let attempt = turn.state.new_attempt();
+        let realizations_max = turn.state.config.active_realizations_max;
+        let in_memory = turn.state.realizations();
+        let Some(job) = turn.state.jobs.get_mut(&id) else {
             return false;
         };
         let Some(at) = job.ahead.branches.iter().position(|it| it.part == part) else {
@@ -198,9 +187,13 @@ fn begin(state: &mut State, id: JobId, part: u64) -> bool {
         }
         // The lowest number that it may get. The number only decides which batches are audited.
         let number = job.search.evaluations() + 1;
-        let evaluation = PendingEvaluation::new(number, attempt, point, realizations);
+        let evaluation = job.new_evaluation(number, attempt, point, &turn.state.config);
+        let waits = !evaluation.queue.is_empty();
         job.ahead.branches[at].evaluation = Some(evaluation);
-        return true;
+        // All of it may have been saved.
+        if !job.ahead.take_in(part, turn.now) {
+            return waits;
+        }
     }
 }
 

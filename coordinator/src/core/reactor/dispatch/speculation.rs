@@ -49,10 +49,7 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
         }
         None => match ahead::adopt(job, &point) {
             Some(known) => renumbered(known, number, turn.now),
-            None => {
-                let realizations = job.record.specification.monte_carlo.realizations;
-                PendingEvaluation::new(number, attempt, point, realizations)
-            }
+            None => job.new_evaluation(number, attempt, point, &turn.state.config),
         },
     };
     let speculates = speculates(&turn.state.config, job);

@@ -46,6 +46,7 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
+    job.saved.forget(name);
     turn.state.changed.insert(id);
     let contributed = job.workers.contains(name);
     match &mut job.stage {

@@ -44,6 +44,8 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
         estimated_error,
         workers: workers.clone(),
         assessment: None,
+        // The search's own record is on its way to the store.
+        unsaved: None,
     };
     ahead::keep_if_awaited(job, &point, prepared);
     let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
@@ -53,7 +55,7 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     if is_last {
         speculation::prepare(turn, id, &outcomes);
     }
-    ahead::refresh(turn.state, id);
+    ahead::refresh(turn, id);
 }
 
 /// Takes in an evaluation that may be complete: that of the search, or one ahead of it.
@@ -170,7 +172,7 @@ pub(crate) fn advance(turn: &mut Turn, id: JobId) {
             speculation::begin(turn, id, point);
             // From here on the search computes the points of this part itself.
             ahead::drop_before(turn, id, part + 1);
-            ahead::refresh(turn.state, id);
+            ahead::refresh(turn, id);
             store_if_complete(turn, id);
             return;
         }
@@ -207,14 +209,21 @@ fn store_prepared(turn: &mut Turn, id: JobId) -> bool {
             after.anticipate(assessment);
         }
         after.tell(Arc::clone(&outcomes), estimated_error);
-        records.push(EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers });
+        records.push(EvaluationRecord {
+            job: id,
+            number,
+            point,
+            outcomes,
+            estimated_error,
+            workers,
+        });
     }
     turn.effects.push(Effect::Store(Record::Evaluations(records.clone())));
     job.progressed = turn.now;
     job.stage = Stage::StoringPrepared { records, after };
     // Its candidates were those of another point.
     speculation::drop_all(turn, id);
-    ahead::refresh(turn.state, id);
+    ahead::refresh(turn, id);
     true
 }
 

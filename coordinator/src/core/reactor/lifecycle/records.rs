@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::jobs;
 use crate::core::effect::{Answer, Effect, Record, RecordKey, Refusal};
+use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::JobId;
 use crate::core::job::{EndedJob, Job, RequestName, Stage, StoreRetry};
 use crate::core::notice::Notice;
@@ -49,7 +50,8 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             if records.last().is_some_and(|last| last.number == number) =>
         {
             job.stored = number + 1;
-            records.iter_mut().for_each(|record| job.workers.append(&mut record.workers));
+            let workers = records.iter_mut().map(|record| std::mem::take(&mut record.workers));
+            job.workers.extend(workers.flatten());
             job.store_retry = None;
             // The search is moved out of a stage that ends here.
             std::mem::swap(&mut job.search, after);
@@ -63,6 +65,8 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             on_end_stored(turn, id);
             return;
         }
+        // Nothing waits for parts.
+        (RecordKey::Part, _) => return,
         // Ignore the report of a write that has since been repeated.
         _ => {}
     }
@@ -73,6 +77,12 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
 /// written again until it succeeds, because a change takes effect, and a job ends, only once its
 /// record is durable.
 pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: String) {
+    if key == RecordKey::Part {
+        if let Some(job) = turn.state.jobs.get_mut(&id) {
+            job.certain_mut().for_each(PendingEvaluation::save_again);
+        }
+        return;
+    }
     let retry_at = turn.now + turn.state.config.store_retry;
     let Some(job) =
         turn.state.jobs.get_mut(&id).filter(|job| job.record_being_stored() == Some(key))

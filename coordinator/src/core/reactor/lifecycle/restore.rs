@@ -1,6 +1,7 @@
 //! Restores a state from the store. The evaluations of jobs are not read here, however many there
 //! are: a job that has not ended reads its own when its turn comes.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use osteon_common::version;
@@ -11,8 +12,9 @@ use crate::core::effect::Effect;
 use crate::core::ids::JobId;
 use crate::core::job::{EndedJob, Job, RequestName, Stage, sequence};
 use crate::core::reactor::turn::Turn;
+use crate::core::saved::SavedParts;
 use crate::core::state::{Banned, State};
-use crate::store::{BanRecord, JobRecord, Store, StoreError};
+use crate::store::{BanRecord, JobRecord, PartRecord, Store, StoreError};
 
 /// Contents of a store, without evaluations.
 #[derive(Debug, Default)]
@@ -20,6 +22,8 @@ pub struct Restored {
     ended: Vec<(JobId, EndedJob)>,
     /// Each with the number of its stored evaluations.
     unfinished: Vec<(JobRecord, u64)>,
+    /// Results of incomplete evaluations of these, by their jobs.
+    parts: BTreeMap<JobId, Vec<PartRecord>>,
     banned: Vec<BanRecord>,
     last_deleted_job: Option<JobId>,
 }
@@ -49,6 +53,12 @@ impl Restored {
         }
         restored.banned = store.bans()?;
         restored.last_deleted_job = store.last_deleted_job()?;
+        for (JobRecord { job, .. }, _) in &restored.unfinished {
+            let parts = store.parts(*job)?;
+            if !parts.is_empty() {
+                restored.parts.insert(*job, parts);
+            }
+        }
         Ok(restored)
     }
 }
@@ -95,7 +105,7 @@ impl State {
     /// Returns a coordinator that continues with `restored`, as of `now`, and its first effects.
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
         let mut state = Self::new(config, now);
-        let Restored { ended, unfinished, banned, last_deleted_job } = restored;
+        let Restored { ended, unfinished, mut parts, banned, last_deleted_job } = restored;
         state.next_job = last_deleted_job.map_or(1, |job| job.0 + 1);
         let durable = |record| Banned { record, store_at: None, refused: false };
         state.banned = banned.into_iter().map(durable).collect();
@@ -109,7 +119,10 @@ impl State {
             let id = record.job;
             state.know(id, RequestName::from_record(&record));
             state.waiting.push_back(id);
-            state.jobs.insert(id, Job::new(record, Stage::Waiting, evaluations, now));
+            let mut job = Job::new(record, Stage::Waiting, evaluations, now);
+            let parts = parts.remove(&id).unwrap_or_default();
+            job.saved = SavedParts::new(parts, |worker| state.ban(worker).is_some());
+            state.jobs.insert(id, job);
         }
         let mut turn = Turn::new(&mut state, now);
         jobs::begin_waiting(&mut turn);

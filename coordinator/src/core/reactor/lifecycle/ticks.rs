@@ -4,11 +4,12 @@ use std::time::Duration;
 
 use super::{jobs, records, workers};
 use crate::core::close_reason::CloseReason;
-use crate::core::effect::Effect;
+use crate::core::effect::{Effect, Record};
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::sequence;
 use crate::core::reactor::dispatch::poison;
 use crate::core::reactor::turn::Turn;
+use crate::core::saved::{self, SAVE_AFTER, SAVE_EVERY};
 use crate::core::snapshot;
 use crate::core::state::{AttachedWorker, State};
 
@@ -99,6 +100,31 @@ pub(crate) fn store_again(turn: &mut Turn) {
         if turn.now >= store_retry.retry_at && !store_retry.in_flight {
             store_retry.in_flight = true;
             records::store_again(job, &mut turn.effects);
+        }
+    }
+}
+
+/// Saves the results of evaluations that take long, or that wait long for their search; before a stop,
+/// of all.
+pub(crate) fn save_parts(turn: &mut Turn, before_stop: bool) {
+    let now = turn.now;
+    let age = if before_stop { Duration::ZERO } else { SAVE_AFTER };
+    for id in &turn.state.active {
+        let Some(job) = turn.state.jobs.get_mut(id) else {
+            continue;
+        };
+        for evaluation in job.certain_mut() {
+            let save_at = *evaluation.save_at.get_or_insert(now + SAVE_AFTER);
+            if (before_stop || now >= save_at)
+                && let Some(part) = saved::take_unsaved(evaluation, *id)
+            {
+                evaluation.save_at = Some(now + SAVE_EVERY);
+                turn.effects.push(Effect::Store(Record::Part(part)));
+            }
+        }
+        for mut complete in job.ahead.take_unsaved(now.saturating_sub(age)) {
+            let part = saved::take_unsaved(&mut complete, *id);
+            turn.effects.extend(part.map(|part| Effect::Store(Record::Part(part))));
         }
     }
 }

@@ -123,7 +123,10 @@ fn other_groups_follow_the_first_and_share_its_start() {
     rig.state.config.audit_fraction = 0.0;
     rig.accept(grouped(3, 2));
     // All groups begin at one point, so the second worker waits for the first.
-    rig.check(hello(1, 1), &["welcome 1, lease 1", "send 1: batch 1 = 0+1", "send 1: batch 2 = 1+1"]);
+    rig.check(
+        hello(1, 1),
+        &["welcome 1, lease 1", "send 1: batch 1 = 0+1", "send 1: batch 2 = 1+1"],
+    );
     rig.check(hello(2, 1), &["welcome 2, lease 2"]);
     rig.event(answer(1, 1, 0, 1));
     let effects = rig.event(answer(1, 2, 1, 1));

@@ -1,0 +1,153 @@
+//! Results of incomplete evaluations: saved now and then, and used after a restart.
+
+use super::*;
+use crate::core::reactor::Restored;
+use crate::core::worker_name::WorkerName;
+use crate::store::memory::MemoryStore;
+use crate::store::{BanRecord, Store as _};
+
+/// Returns a rig with a propagation of 100 realizations of which worker 1 has answered the first
+/// batches, and worker 2 none.
+fn rig() -> (Rig, u64) {
+    let mut rig = Rig::new();
+    rig.state.config.audit_fraction = 0.0;
+    rig.accept(propagation(100));
+    rig.event(hello_on("one", 1, 1, 2));
+    let mut answered = 0;
+    for _ in 0..2 {
+        let held = &rig.state.workers[&WorkerId(1)].in_flight;
+        let batch = held[0];
+        let indices = rig.state.batches[&batch].assignment.indices;
+        rig.event(answer(1, batch.0, indices.first, indices.count));
+        answered += indices.count;
+    }
+    rig.event(hello_on("two", 2, 2, 2));
+    (rig, answered)
+}
+
+/// Applies an event, and stores the parts among its effects. Returns the number of results in them.
+fn stored_parts(rig: &mut Rig, store: &mut MemoryStore, event: Event) -> usize {
+    let effects = react(&mut rig.state, event, rig.now);
+    let parts = effects.iter().filter_map(|effect| match effect {
+        Effect::Store(Record::Part(part)) => Some(part),
+        _ => None,
+    });
+    let mut results = 0;
+    for part in parts {
+        store.put_part(part).unwrap();
+        results += part.pieces.iter().map(|piece| piece.results.len()).sum::<usize>();
+    }
+    results
+}
+
+/// Returns what another coordinator makes of the store.
+fn restarted(rig: &Rig, store: &mut MemoryStore) -> Rig {
+    store.put_job(&rig.state.jobs[&JobId(1)].record).unwrap();
+    let restored = Restored::load(store).unwrap();
+    let config = Config { audit_fraction: 0.0, speculation: false, ..Config::default() };
+    let (state, _) = State::restore(config, restored, rig.now);
+    sanity_check(&state).unwrap();
+    Rig { state, now: rig.now }
+}
+
+fn filled(rig: &Rig) -> u64 {
+    rig.state.jobs[&JobId(1)].evaluation().unwrap().filled()
+}
+
+#[test]
+fn a_restart_repeats_only_what_was_answered_last() {
+    let (mut rig, answered) = rig();
+    let mut store = MemoryStore::new();
+    // Nothing is saved of an evaluation that is soon complete.
+    assert_eq!(stored_parts(&mut rig, &mut store, Event::Tick), 0);
+    rig.now += Duration::from_secs(1);
+    assert_eq!(stored_parts(&mut rig, &mut store, Event::Tick), 0);
+    rig.now += Duration::from_secs(1);
+    assert_eq!(stored_parts(&mut rig, &mut store, Event::Tick) as u64, answered);
+    // What is saved is not saved again.
+    rig.now += Duration::from_secs(2);
+    assert_eq!(stored_parts(&mut rig, &mut store, Event::Tick), 0);
+    let mut after = restarted(&rig, &mut store);
+    assert_eq!(filled(&after), answered);
+    let first = format!("send 1: batch 1 = {answered}+");
+    assert!(after.event(hello(1, 2))[1].starts_with(&first), "{first}");
+}
+
+#[test]
+fn a_stop_saves_everything() {
+    let (mut rig, answered) = rig();
+    let mut store = MemoryStore::new();
+    assert_eq!(stored_parts(&mut rig, &mut store, Event::Drain) as u64, answered);
+    assert_eq!(filled(&restarted(&rig, &mut store)), answered);
+}
+
+#[test]
+fn a_write_that_fails_is_repeated_with_the_next() {
+    let (mut rig, answered) = rig();
+    let mut store = MemoryStore::new();
+    stored_parts(&mut rig, &mut store, Event::Tick);
+    rig.now += Duration::from_secs(2);
+    assert_eq!(stored_parts(&mut rig, &mut MemoryStore::new(), Event::Tick) as u64, answered);
+    let error = "the disk is full".to_owned();
+    rig.check(Event::StoreFailed { job: JobId(1), key: RecordKey::Part, error }, &[]);
+    rig.now += Duration::from_secs(2);
+    assert_eq!(stored_parts(&mut rig, &mut store, Event::Tick) as u64, answered);
+    assert_eq!(filled(&restarted(&rig, &mut store)), answered);
+}
+
+#[test]
+fn answers_of_a_banned_worker_are_not_used() {
+    let (mut rig, answered) = rig();
+    let mut store = MemoryStore::new();
+    stored_parts(&mut rig, &mut store, Event::Drain);
+    let worker = WorkerName::new("one", 1, 0);
+    let reason = "lies".to_owned();
+    let ban = BanRecord { number: 1, worker: worker.clone(), job: JobId(1), reason, at: rig.now };
+    // Banned after the restart.
+    let mut after = restarted(&rig, &mut store);
+    assert_eq!(filled(&after), answered);
+    bans::ban(&mut Turn::new(&mut after.state, rig.now), &worker, JobId(1), "lies".to_owned());
+    sanity_check(&after.state).unwrap();
+    assert_eq!(filled(&after), 0);
+    // Banned before it.
+    store.put_ban(&ban).unwrap();
+    assert_eq!(filled(&restarted(&rig, &mut store)), 0);
+}
+
+#[test]
+fn what_is_used_again_is_audited_like_an_answer() {
+    let (mut rig, answered) = rig();
+    let mut store = MemoryStore::new();
+    stored_parts(&mut rig, &mut store, Event::Drain);
+    store.put_job(&rig.state.jobs[&JobId(1)].record).unwrap();
+    let restored = Restored::load(&mut store).unwrap();
+    let config = Config { audit_fraction: 1.0, speculation: false, ..Config::default() };
+    let (state, _) = State::restore(config, restored, rig.now);
+    let audits = &state.jobs[&JobId(1)].evaluation().unwrap().audits;
+    let audited: u64 = audits.iter().map(|audit| audit.indices.count).sum();
+    assert_eq!(audited, answered);
+}
+
+#[test]
+fn a_complete_evaluation_leaves_nothing_saved() {
+    let (mut rig, _) = rig();
+    let mut store = MemoryStore::new();
+    stored_parts(&mut rig, &mut store, Event::Drain);
+    assert!(!store.parts(JobId(1)).unwrap().is_empty());
+    let mut after = restarted(&rig, &mut store);
+    let mut sent: Vec<Effect> = react(&mut after.state, hello(1, 2), after.now);
+    while let Some(effect) = sent.pop() {
+        match effect {
+            Effect::Send { worker, batch, work } => {
+                let answer = answer(worker.0, batch.0, work.first, work.count.into());
+                sent.extend(react(&mut after.state, answer, after.now));
+            }
+            Effect::Store(Record::Evaluation { record, is_last }) => {
+                assert_eq!(record.outcomes, (0..100).map(velocity).collect());
+                store.put_evaluation(&record, is_last).unwrap();
+            }
+            _ => {}
+        }
+    }
+    assert!(store.parts(JobId(1)).unwrap().is_empty());
+}

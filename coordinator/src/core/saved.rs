@@ -1,0 +1,107 @@
+//! Results of incomplete evaluations: saved while a coordinator runs, used by the next one.
+//!
+//! A large evaluation takes a while, and so do many that wait for their search to ask for them. If the
+//! coordinator dies, only what was answered last is computed again.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use osteon_common::parameters::{PARAMETERS, Point};
+
+use crate::core::audit::{self, AuditKey};
+use crate::core::evaluation::{Audit, PendingEvaluation};
+use crate::core::ids::JobId;
+use crate::core::indices::Indices;
+use crate::core::worker_name::WorkerName;
+use crate::store::{PartRecord, Piece};
+
+/// Results are saved when they, or their evaluation, are this old.
+pub(crate) const SAVE_AFTER: Duration = Duration::from_millis(1500);
+/// Interval at which further results of an evaluation are saved.
+pub(crate) const SAVE_EVERY: Duration = Duration::from_secs(1);
+/// Maximum number of results in a piece: it may be audited as a whole.
+const PIECE_MAX: usize = 4096;
+
+/// A point, to be compared to the bit.
+pub(crate) type PointBits = [u64; PARAMETERS];
+
+/// Returns the bits of a point.
+pub(crate) fn point_bits(point: &Point) -> PointBits {
+    point.0.map(f64::to_bits)
+}
+
+/// Results that an earlier coordinator saved for a job, by the points of their evaluations.
+#[derive(Debug, Default)]
+pub(crate) struct SavedParts(BTreeMap<PointBits, Vec<Piece>>);
+
+impl SavedParts {
+    /// Returns the results in these records, without those of the workers for which `banned` is true.
+    pub(crate) fn new(records: Vec<PartRecord>, banned: impl Fn(&WorkerName) -> bool) -> Self {
+        let mut saved = Self::default();
+        for PartRecord { point, pieces, .. } in records {
+            let sound = pieces.into_iter().filter(|piece| !banned(&piece.by));
+            saved.0.entry(point_bits(&point)).or_default().extend(sound);
+        }
+        saved
+    }
+
+    /// Fills a new evaluation with the results that were saved for its point. They are audited like
+    /// answers that have just arrived.
+    pub(crate) fn restore(
+        &mut self,
+        evaluation: &mut PendingEvaluation,
+        job: JobId,
+        (key, fraction): (&AuditKey, f64),
+    ) {
+        let Some(pieces) = self.0.remove(&point_bits(&evaluation.point)) else {
+            return;
+        };
+        let number = evaluation.number;
+        for Piece { first, by, results } in pieces {
+            let indices = Indices { first, count: results.len() as u64 };
+            if indices.end() > evaluation.results.len() as u64 {
+                continue;
+            }
+            evaluation.fill(indices, &results, &by);
+            if audit::is_chosen(key, job, number, first, fraction) {
+                evaluation.audits.push_back(Audit { indices, by, lost: 0 });
+            }
+        }
+        // They are in the store already.
+        evaluation.unsaved.clear();
+        evaluation.queue_unfilled();
+    }
+
+    /// Drops the results of a worker.
+    pub(crate) fn forget(&mut self, name: &WorkerName) {
+        self.0.values_mut().for_each(|pieces| pieces.retain(|piece| piece.by != *name));
+    }
+}
+
+/// Takes the results of an evaluation that are not in the store yet, as a record; `None` if there are
+/// none, or if any are disputed.
+pub(crate) fn take_unsaved(evaluation: &mut PendingEvaluation, job: JobId) -> Option<PartRecord> {
+    if evaluation.unsaved.is_empty() || !evaluation.disputes.is_empty() {
+        return None;
+    }
+    let mut pieces: Vec<Piece> = Vec::new();
+    for indices in std::mem::take(&mut evaluation.unsaved) {
+        for index in indices.first..indices.end() {
+            let Some((result, by)) = evaluation.result(index) else {
+                continue;
+            };
+            match pieces.last_mut() {
+                Some(last)
+                    if last.by == *by
+                        && last.first + last.results.len() as u64 == index
+                        && last.results.len() < PIECE_MAX =>
+                {
+                    last.results.push(result);
+                }
+                _ => pieces.push(Piece { first: index, by: by.clone(), results: vec![result] }),
+            }
+        }
+    }
+    let point = evaluation.point;
+    (!pieces.is_empty()).then_some(PartRecord { job, point, pieces })
+}

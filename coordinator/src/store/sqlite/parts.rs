@@ -1,0 +1,129 @@
+//! Results of evaluations that are not complete, or that their search has not asked for yet.
+//!
+//! They are a help only: what is damaged, or of other numerics, is left out and computed again.
+
+use osteon_common::outcome::{RealizationResult, decode, encode};
+use osteon_common::version;
+use rusqlite::{Connection, params};
+
+use super::columns::{checksum, pack_point, pack_worker, unpack, unpack_worker};
+use crate::core::ids::JobId;
+use crate::store::{PartRecord, Piece};
+
+/// The table. Earlier versions had none, and a file without it is one without parts.
+pub(super) const TABLE: &str = "
+    CREATE TABLE IF NOT EXISTS part (    -- of evaluations that are not stored yet
+        number INTEGER PRIMARY KEY,
+        job INTEGER NOT NULL REFERENCES job(id),
+        point BLOB NOT NULL,             -- as of an evaluation
+        worker TEXT NOT NULL,            -- that gave the results: PROCESS/INSTANCE HOST
+        first INTEGER NOT NULL,          -- index
+        results BLOB NOT NULL,           -- per index: code byte, velocity, estimated error (f64)
+        fingerprint TEXT NOT NULL,       -- of the numerics
+        checksum BLOB NOT NULL
+    );
+    CREATE INDEX IF NOT EXISTS part_of_job ON part (job, point);
+";
+
+/// Size of a result in a blob, bytes: its code, its velocity and its estimated error.
+const RESULT_BYTES: usize = 17;
+
+/// Adds the pieces of a part, in one transaction with whatever is open.
+pub(super) fn put(connection: &Connection, record: &PartRecord) -> rusqlite::Result<()> {
+    let sql = "INSERT INTO part (job, point, worker, first, results, fingerprint, checksum)
+               VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
+    let mut insert = connection.prepare(sql)?;
+    let point = pack_point(record.point);
+    let fingerprint = version::fingerprint();
+    for piece in &record.pieces {
+        let (worker, results) = (pack_worker(&piece.by), pack_results(&piece.results));
+        let checksum =
+            part_checksum(record.job, &point, &worker, piece.first, &results, &fingerprint);
+        insert.execute(params![
+            record.job.0,
+            point,
+            worker,
+            piece.first,
+            results,
+            fingerprint,
+            checksum
+        ])?;
+    }
+    Ok(())
+}
+
+/// Returns the parts of a job, in the order in which they were added.
+pub(super) fn of_job(connection: &Connection, job: JobId) -> rusqlite::Result<Vec<PartRecord>> {
+    let sql = "SELECT point, worker, first, results, fingerprint, checksum FROM part
+               WHERE job = ?1 ORDER BY number";
+    let mut select = connection.prepare(sql)?;
+    let mut rows = select.query(params![job.0])?;
+    let mut parts: Vec<PartRecord> = Vec::new();
+    while let Some(row) = rows.next()? {
+        let (point, results) = (row.get_ref(0)?.as_blob()?, row.get_ref(3)?.as_blob()?);
+        let (worker, fingerprint) = (row.get_ref(1)?.as_str()?, row.get_ref(4)?.as_str()?);
+        let (first, stored): (u64, Vec<u8>) = (row.get(2)?, row.get(5)?);
+        let intact = stored == part_checksum(job, point, worker, first, results, fingerprint);
+        if !intact || fingerprint != version::fingerprint() {
+            tracing::warn!(%job, first, intact, "saved results are not usable; they are computed again");
+            continue;
+        }
+        let unpacked = unpack(point).zip(unpack_worker(worker)).zip(unpack_results(results));
+        let Some(((point, by), results)) = unpacked else {
+            continue;
+        };
+        let piece = Piece { first, by, results };
+        match parts.last_mut() {
+            Some(last) if osteon_search::same_point(&last.point, &point) => last.pieces.push(piece),
+            _ => parts.push(PartRecord { job, point, pieces: vec![piece] }),
+        }
+    }
+    Ok(parts)
+}
+
+/// Deletes the parts of the evaluation at a point.
+pub(super) fn delete_at(connection: &Connection, job: JobId, point: &[u8]) -> rusqlite::Result<()> {
+    let mut delete = connection.prepare("DELETE FROM part WHERE job = ?1 AND point = ?2")?;
+    delete.execute(params![job.0, point]).map(drop)
+}
+
+/// Deletes the parts of a job.
+pub(super) fn delete_of(connection: &Connection, job: JobId) -> rusqlite::Result<()> {
+    let mut delete = connection.prepare("DELETE FROM part WHERE job = ?1")?;
+    delete.execute(params![job.0]).map(drop)
+}
+
+fn part_checksum(
+    job: JobId,
+    point: &[u8],
+    worker: &str,
+    first: u64,
+    results: &[u8],
+    fingerprint: &str,
+) -> Vec<u8> {
+    let (job, first) = (job.0.to_le_bytes(), first.to_le_bytes());
+    checksum(&[&job, point, worker.as_bytes(), &first, results, fingerprint.as_bytes()])
+}
+
+fn pack_results(results: &[RealizationResult]) -> Vec<u8> {
+    let mut packed = Vec::with_capacity(results.len() * RESULT_BYTES);
+    for result in results {
+        let (code, velocity) = encode(result.outcome);
+        packed.push(code);
+        packed.extend(velocity.to_le_bytes());
+        packed.extend(result.estimated_error.to_le_bytes());
+    }
+    packed
+}
+
+fn unpack_results(packed: &[u8]) -> Option<Vec<RealizationResult>> {
+    let (records, rest) = packed.as_chunks::<RESULT_BYTES>();
+    let number = |bytes: &[u8]| bytes.try_into().ok().map(f64::from_le_bytes);
+    let result = |[code, numbers @ ..]: &[u8; RESULT_BYTES]| {
+        let (velocity, error) = numbers.split_at(8);
+        let outcome = decode(*code, number(velocity)?)?;
+        let result = RealizationResult { outcome, estimated_error: number(error)? };
+        result.is_consistent().then_some(result)
+    };
+    rest.is_empty().then(|| records.iter().map(result).collect()).flatten()
+}

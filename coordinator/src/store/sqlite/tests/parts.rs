@@ -1,0 +1,80 @@
+//! Results of incomplete evaluations.
+
+use osteon_common::outcome::RealizationResult;
+
+use super::*;
+use crate::store::{PartRecord, Piece};
+
+/// A part of the evaluation with this number, in two pieces.
+fn part(job: u64, number: u64) -> PartRecord {
+    let result = |k: u32| RealizationResult {
+        outcome: if k == 1 { Err(FailureKind::NoArrival) } else { Ok(3900.0 + f64::from(k)) },
+        estimated_error: if k == 1 { 0.0 } else { 1e-5 * f64::from(k) },
+    };
+    let piece = |first: u64, process| Piece {
+        first,
+        by: WorkerName::new("a node", process, 1 << 63),
+        results: (0..3).map(result).collect(),
+    };
+    let point = evaluation(job, number).point;
+    PartRecord { job: JobId(job), point, pieces: vec![piece(0, 7), piece(40, 8)] }
+}
+
+fn store() -> (tempfile::TempDir, SqliteStore) {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    for id in [1, 2] {
+        store.put_job(&job(id)).unwrap();
+        for number in [0, 1] {
+            store.put_part(&part(id, number)).unwrap();
+        }
+    }
+    (directory, store)
+}
+
+#[test]
+fn parts_last_until_their_evaluation_is_stored() {
+    let (directory, mut store) = store();
+    drop(store);
+    store = SqliteStore::open(directory.path()).unwrap();
+    assert_eq!(store.parts(JobId(1)).unwrap(), [part(1, 0), part(1, 1)]);
+    store.put_evaluation(&evaluation(1, 1), true).unwrap();
+    assert_eq!(store.parts(JobId(1)).unwrap(), [part(1, 0)]);
+    store.finish_job(&end(1), &summary(1)).unwrap();
+    assert_eq!(store.parts(JobId(1)).unwrap(), []);
+    assert_eq!(store.parts(JobId(2)).unwrap(), [part(2, 0), part(2, 1)]);
+    store.reset_job(JobId(2), "osteon 1.2.4 numerics 5").unwrap();
+    assert_eq!(store.parts(JobId(2)).unwrap(), []);
+    store.put_part(&part(2, 0)).unwrap();
+    store.delete_jobs(&[JobId(2)]).unwrap();
+    assert_eq!(store.parts(JobId(2)).unwrap(), []);
+}
+
+#[test]
+fn what_is_damaged_or_of_other_numerics_is_left_out() {
+    for sql in [
+        "UPDATE part SET point = zeroblob(56) WHERE number = 1",
+        "UPDATE part SET worker = '9/0 b' WHERE number = 1",
+        "UPDATE part SET first = 1 WHERE number = 1",
+        "UPDATE part SET results = zeroblob(51) WHERE number = 1",
+        "UPDATE part SET fingerprint = 'osteon 0.0.0 numerics 0' WHERE number = 1",
+        "UPDATE part SET checksum = x'' WHERE number = 1",
+    ] {
+        let (_directory, mut store) = store();
+        assert_eq!(store.connection.execute(sql, []).unwrap(), 1, "{sql}");
+        let mut first = part(1, 0);
+        first.pieces.remove(0);
+        assert_eq!(store.parts(JobId(1)).unwrap(), [first, part(1, 1)], "{sql}");
+    }
+}
+
+#[test]
+fn a_file_of_a_version_without_parts_is_opened() {
+    let (directory, store) = store();
+    store.connection.execute_batch("DROP TABLE part").unwrap();
+    drop(store);
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    assert_eq!(store.parts(JobId(1)).unwrap(), []);
+    store.put_part(&part(1, 0)).unwrap();
+    assert_eq!(store.parts(JobId(1)).unwrap(), [part(1, 0)]);
+}
