@@ -32,7 +32,7 @@ const TICK: Duration = Duration::from_millis(100);
 const HEARTBEAT: Duration = Duration::from_secs(2);
 /// Time of a message on its way.
 const LATENCY: Duration = Duration::from_micros(100);
-/// Time until a record is durable.
+/// Time until a record of groups is durable; those of propagations are so at once.
 const SYNC: Duration = Duration::from_millis(4);
 /// Realizations of an evaluation of each group.
 const OF_GROUP: u64 = 1024;
@@ -73,6 +73,8 @@ enum Next {
 struct Fleet {
     state: State,
     each: Duration,
+    /// Time until a record is durable.
+    sync: Duration,
     now: Duration,
     queue: BinaryHeap<Reverse<(Duration, u64, Next)>>,
     numbers: u64,
@@ -190,14 +192,15 @@ fn grouped(groups: usize) -> JobSpecification {
 
 impl Fleet {
     fn new(row: &Row) -> Self {
-        let audit_fraction = match row.job {
-            Job::Propagation(_) => 0.0,
-            Job::Groups(_) => AUDIT_FRACTION,
+        let (audit_fraction, sync) = match row.job {
+            Job::Propagation(_) => (0.0, Duration::ZERO),
+            Job::Groups(_) => (AUDIT_FRACTION, SYNC),
         };
         let config = Config { audit_fraction, ahead: row.ahead, ..Config::default() };
         let mut fleet = Self {
             state: State::new(config, Duration::ZERO),
             each: row.each,
+            sync,
             now: Duration::ZERO,
             queue: BinaryHeap::new(),
             numbers: 0,
@@ -288,7 +291,7 @@ impl Fleet {
                 Effect::Store(record) => {
                     let (job, key) = record.key();
                     self.storing.push_back(Event::Stored { job, key });
-                    self.schedule(SYNC, Next::Stored);
+                    self.schedule(self.sync, Next::Stored);
                     let records = match &record {
                         Record::Evaluation { record, .. } => std::slice::from_ref(record),
                         Record::Evaluations(records) => records,
