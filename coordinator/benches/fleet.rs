@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 
 use osteon_common::job::{Data, Group, JobSpecification, Sampling, Search, SearchMethod};
 use osteon_coordinator::config::{AUDIT_FRACTION, Config};
+use osteon_coordinator::core::completion::Completed;
 use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::{Event, Hello};
 use osteon_coordinator::core::ids::{ReplyId, WorkerId};
@@ -67,6 +68,8 @@ enum Next {
     Answer(u64),
     /// The record that has waited longest is durable.
     Stored,
+    /// An evaluation has been completed beside the core.
+    Completed,
 }
 
 /// A fleet with its coordinator.
@@ -80,6 +83,7 @@ struct Fleet {
     numbers: u64,
     /// Batches of each worker in the order they were sent, each with the time at which it ends.
     held: BTreeMap<u64, VecDeque<(Effect, Duration)>>,
+    completed: VecDeque<Completed>,
     /// Events that report records on their way to the store.
     storing: VecDeque<Event>,
     /// Number of evaluations that were stored, with their realizations.
@@ -205,6 +209,7 @@ impl Fleet {
             queue: BinaryHeap::new(),
             numbers: 0,
             held: BTreeMap::new(),
+            completed: VecDeque::new(),
             storing: VecDeque::new(),
             stored: (0, 0),
             batches: 0,
@@ -240,6 +245,10 @@ impl Fleet {
                     self.react(Event::Heartbeat { worker: WorkerId(worker) });
                 }
                 Next::Answer(worker) => self.answer(worker),
+                Next::Completed => {
+                    let completed = self.completed.pop_front().unwrap();
+                    self.react(Event::Completed(completed));
+                }
                 Next::Stored => {
                     let stored = self.storing.pop_front().unwrap();
                     self.react(stored);
@@ -287,6 +296,12 @@ impl Fleet {
                     let until = free.max(self.now + LATENCY) + takes;
                     held.push_back((effect, until));
                     self.schedule(until + LATENCY - self.now, Next::Answer(worker.0));
+                }
+                Effect::Complete(completion) => {
+                    // It runs on another thread.
+                    let begun = Instant::now();
+                    self.completed.push_back(completion.run());
+                    self.schedule(begun.elapsed(), Next::Completed);
                 }
                 Effect::Store(record) => {
                     let (job, key) = record.key();

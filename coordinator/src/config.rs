@@ -32,6 +32,8 @@ pub struct Config {
     /// Whether groups and starts that a search has not come to are computed at the same time as those
     /// before them.
     pub ahead: bool,
+    /// Evaluations with at least this many realizations are completed beside the core.
+    pub completed_aside_min: u64,
     /// Whether otherwise idle slots compute candidate points of searches speculatively.
     pub speculation: bool,
     /// Ended jobs are deleted after this long; `None`: only when a client requests it.
@@ -71,6 +73,7 @@ impl Default for Config {
             audit_fraction: AUDIT_FRACTION,
             audit_key: AuditKey::default(),
             ahead: true,
+            completed_aside_min: 20_000,
             speculation: true,
             keep_ended: None,
             tick: Duration::from_millis(100),

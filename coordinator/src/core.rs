@@ -5,6 +5,7 @@ pub(crate) mod ahead;
 pub mod audit;
 pub(crate) mod batch;
 pub mod close_reason;
+pub mod completion;
 pub(crate) mod crashes;
 pub mod dispute;
 pub mod effect;

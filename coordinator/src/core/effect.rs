@@ -9,6 +9,7 @@ use osteon_search::Summary;
 use thiserror::Error;
 
 use crate::core::close_reason::CloseReason;
+use crate::core::completion::Completion;
 use crate::core::ids::{BatchId, JobId, LeaseId, ReplyId, WorkerId};
 use crate::core::notice::Notice;
 use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord};
@@ -56,6 +57,8 @@ pub enum Effect {
         /// The reason.
         reason: CloseReason,
     },
+    /// Complete an evaluation, then report it with an event.
+    Complete(Completion),
     /// Make a record durable, then report it with an event.
     Store(Record),
     /// Read an evaluation of a job, then report it with an event.
@@ -129,6 +132,17 @@ pub enum Record {
 }
 
 impl Record {
+    /// Returns the record of evaluations with consecutive numbers, at least one.
+    pub(crate) fn of_evaluations(mut records: Vec<EvaluationRecord>, is_last: bool) -> Self {
+        match records.pop() {
+            Some(record) if records.is_empty() => Self::Evaluation { record, is_last },
+            last => {
+                records.extend(last);
+                Self::Evaluations(records)
+            }
+        }
+    }
+
     /// Returns the job and the key of the record.
     pub fn key(&self) -> (JobId, RecordKey) {
         match self {

@@ -48,7 +48,10 @@ pub struct PendingEvaluation {
     pub point: Point,
     /// Contents of the store for it.
     pub(crate) stored: StoredRecord,
-    /// Result of each index.
+    /// Number of realizations.
+    realizations: u64,
+    /// Result of each index, up to the last one that has been filled: a large evaluation is not set up
+    /// at once.
     pub(crate) results: Vec<Option<RealizationResult>>,
     /// Number of results that are filled.
     pub(crate) filled: u64,
@@ -88,13 +91,14 @@ impl PendingEvaluation {
             attempt,
             point,
             stored: StoredRecord::Missing,
-            results: vec![None; length],
+            realizations,
+            results: Vec::with_capacity(length),
             filled: 0,
             queue: VecDeque::from([Indices { first: 0, count: realizations }]),
             crashes: BTreeMap::new(),
             quarantine: VecDeque::new(),
             workers: Vec::new(),
-            owners: vec![0; length],
+            owners: Vec::with_capacity(length),
             audits: VecDeque::new(),
             audits_out: 0,
             disputes: Vec::new(),
@@ -115,11 +119,20 @@ impl PendingEvaluation {
     /// Queues exactly the indices that are not filled: nothing of it has been sent yet.
     pub(crate) fn queue_unfilled(&mut self) {
         self.queue = runs(&self.results, Option::is_none).into();
+        let first = self.results.len() as u64;
+        if first < self.realizations {
+            self.queue.push_back(Indices { first, count: self.realizations - first });
+        }
     }
 
     /// Counts all results as not saved.
     pub(crate) fn save_again(&mut self) {
         self.unsaved = runs(&self.results, Option::is_some);
+    }
+
+    /// Returns the number of realizations.
+    pub fn realizations(&self) -> u64 {
+        self.realizations
     }
 
     /// Returns the number of realizations that have an outcome.
@@ -197,6 +210,11 @@ impl PendingEvaluation {
             _ => self.unsaved.push(indices),
         }
         let first = usize::try_from(indices.first).unwrap_or(usize::MAX);
+        let end = usize::try_from(indices.end().min(self.realizations)).unwrap_or(usize::MAX);
+        if self.results.len() < end {
+            self.results.resize(end, None);
+            self.owners.resize(end, 0);
+        }
         let results = self.results.iter_mut().zip(&mut self.owners).skip(first);
         for ((result, owned), solved) in results.zip(solved) {
             if result.is_none() {
@@ -241,7 +259,7 @@ impl PendingEvaluation {
 
     /// Returns whether every index has an outcome and no check of them is pending.
     pub(crate) fn is_settled(&self) -> bool {
-        self.filled >= self.results.len() as u64
+        self.filled >= self.realizations
             && self.audits.is_empty()
             && self.audits_out == 0
             && self.disputes.is_empty()

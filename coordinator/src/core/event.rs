@@ -7,6 +7,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::outcome::RealizationResult;
 
 use crate::core::close_reason::CloseReason;
+use crate::core::completion::Completed;
 use crate::core::effect::RecordKey;
 use crate::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use crate::store::EvaluationRecord;
@@ -63,6 +64,8 @@ pub enum Event {
         /// The worker.
         worker: WorkerId,
     },
+    /// An evaluation is completed.
+    Completed(Completed),
     /// A record of a job is durable.
     Stored {
         /// The job.

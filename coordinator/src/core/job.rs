@@ -10,7 +10,7 @@ use prost::Message as _;
 
 use crate::config::Config;
 use crate::core::ahead::Ahead;
-use crate::core::evaluation::PendingEvaluation;
+use crate::core::evaluation::{PendingEvaluation, StoredRecord};
 use crate::core::ids::{BatchId, ReplyId};
 use crate::core::rate::Rate;
 use crate::core::realization_time::RealizationTime;
@@ -175,6 +175,8 @@ pub(crate) enum Stage {
     },
     /// Batches of its evaluation are sent to workers.
     Computing(PendingEvaluation),
+    /// A settled evaluation is being completed beside the core.
+    Completing(Settled),
     /// A complete evaluation is being stored.
     StoringEvaluation {
         /// The evaluation.
@@ -182,10 +184,13 @@ pub(crate) enum Stage {
         /// Evaluations stored after it belong to another path of the search and are deleted.
         is_last: bool,
     },
-    /// Evaluations that were complete before the search asked for them are being stored.
+    /// Evaluations that the search need only be exchanged for are being stored: they were complete
+    /// before it asked for them, or were completed beside the core.
     StoringPrepared {
         /// The evaluations, with consecutive numbers; not empty.
         records: Vec<EvaluationRecord>,
+        /// Evaluations stored after them belong to another path of the search and are deleted.
+        is_last: bool,
         /// The search after them.
         after: Box<Search>,
     },
@@ -194,16 +199,29 @@ pub(crate) enum Stage {
 }
 
 impl Stage {
-    /// Whether a record of the job is not durable yet.
+    /// Whether a record of the job is not durable yet, or about to be made.
     pub(crate) fn is_storing(&self) -> bool {
         matches!(
             self,
             Self::StoringSubmission
+                | Self::Completing(_)
                 | Self::StoringEvaluation { .. }
                 | Self::StoringPrepared { .. }
                 | Self::StoringEnd(_)
         )
     }
+}
+
+/// A settled evaluation, whose results are completed elsewhere.
+#[derive(Debug)]
+pub(crate) struct Settled {
+    pub(crate) number: u64,
+    pub(crate) attempt: u64,
+    pub(crate) point: Point,
+    /// All workers whose answers are among the results.
+    pub(crate) workers: Vec<WorkerName>,
+    /// Contents of the store for it.
+    pub(crate) stored: StoredRecord,
 }
 
 /// Points that a search may ask for next. They are neither stored nor shown.

@@ -20,7 +20,7 @@ use crate::core::event::Event;
 use crate::core::state::State;
 
 use self::integrity::{answers, bans, checks};
-use self::lifecycle::{prune, records, replay, requests, ticks, workers};
+use self::lifecycle::{jobs, prune, records, replay, requests, ticks, workers};
 use self::turn::Turn;
 
 mod dispatch;
@@ -62,6 +62,7 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::WorkerDrains { worker } => workers::drains(turn, worker),
         Event::Misbehaved { worker, reason } => workers::close(turn, worker, reason),
         Event::StreamEnded { worker } => workers::stream_ended(turn, worker),
+        Event::Completed(completed) => jobs::completed(turn, completed),
         Event::Stored { key: RecordKey::Ban(number), .. } => bans::stored(turn, number),
         Event::Stored { job, key } => records::on_record_stored(turn, job, key),
         Event::StoreFailed { key: RecordKey::Ban(number), error, .. } => {

@@ -112,6 +112,7 @@ fn check_jobs(state: &State) -> Result<(), Inconsistency> {
             Stage::Waiting => waiting == 1 && !active,
             Stage::Replaying { .. }
             | Stage::Computing(_)
+            | Stage::Completing(_)
             | Stage::StoringEvaluation { .. }
             | Stage::StoringPrepared { .. } => waiting == 0 && active,
             Stage::StoringSubmission | Stage::StoringEnd(_) => waiting == 0 && !active,
@@ -187,7 +188,10 @@ fn check_ahead(state: &State, job: &Job) -> Result<(), Inconsistency> {
 fn is_under_way(job: &Job) -> bool {
     matches!(
         job.stage,
-        Stage::Computing(_) | Stage::StoringEvaluation { .. } | Stage::StoringPrepared { .. }
+        Stage::Computing(_)
+            | Stage::Completing(_)
+            | Stage::StoringEvaluation { .. }
+            | Stage::StoringPrepared { .. }
     )
 }
 
@@ -301,6 +305,7 @@ fn check_evaluation(
 ) -> Result<(), Inconsistency> {
     let mut places: Vec<u32> =
         evaluation.results.iter().map(|result| u32::from(result.is_some())).collect();
+    places.resize(usize::try_from(evaluation.realizations()).unwrap_or(usize::MAX), 0);
     if places.iter().map(|place| u64::from(*place)).sum::<u64>() != evaluation.filled {
         return Err(Inconsistency::Filled(job));
     }

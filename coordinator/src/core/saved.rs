@@ -59,7 +59,7 @@ impl SavedParts {
         let number = evaluation.number;
         for Piece { first, by, results } in pieces {
             let indices = Indices { first, count: results.len() as u64 };
-            if indices.end() > evaluation.results.len() as u64 {
+            if indices.end() > evaluation.realizations() {
                 continue;
             }
             evaluation.fill(indices, &results, &by);

@@ -46,7 +46,10 @@ pub(crate) fn job_snapshot(state: &State, id: JobId, now: Duration) -> Option<Jo
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = evaluation.filled();
         }
-        Stage::StoringEvaluation { .. } | Stage::StoringPrepared { .. } | Stage::StoringEnd(_) => {
+        Stage::Completing(_)
+        | Stage::StoringEvaluation { .. }
+        | Stage::StoringPrepared { .. }
+        | Stage::StoringEnd(_) => {
             snapshot.set_state(JobState::Running);
             snapshot.realizations_done = realizations;
         }
@@ -161,6 +164,7 @@ fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
         Stage::Computing(_) if !unfit.is_empty() => format!("nothing; {unfit}"),
         Stage::StoringSubmission
         | Stage::Computing(_)
+        | Stage::Completing(_)
         | Stage::StoringEvaluation { .. }
         | Stage::StoringPrepared { .. }
         | Stage::StoringEnd(_) => String::new(),

@@ -8,6 +8,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::config::Config;
 use crate::core::close_reason::CloseReason;
+use crate::core::completion::Completion;
 use crate::core::effect::{Answer, Effect, Refusal};
 use crate::core::event::{Event, Hello, ReadFailure, Request};
 use crate::core::ids::{JobId, ReplyId, WorkerId};
@@ -54,6 +55,8 @@ pub(crate) struct Core {
     state: State,
     clock: Clock,
     commands: mpsc::Sender<StoreCommand>,
+    /// Leads back to this task.
+    events: mpsc::Sender<Event>,
     next_reply_id: u64,
     waiting: BTreeMap<ReplyId, oneshot::Sender<Answer>>,
     /// Newest snapshots of the jobs that are being watched.
@@ -70,6 +73,7 @@ impl Core {
         state: State,
         clock: Clock,
         commands: mpsc::Sender<StoreCommand>,
+        events: mpsc::Sender<Event>,
         failing: FailureReporter,
     ) -> Self {
         let config = state.config;
@@ -77,6 +81,7 @@ impl Core {
             state,
             clock,
             commands,
+            events,
             next_reply_id: 0,
             waiting: BTreeMap::new(),
             watching: BTreeMap::new(),
@@ -166,6 +171,7 @@ impl Core {
                     self.send(worker, outbound::drain(), followups);
                 }
                 Effect::Close { worker, reason } => self.close(worker, &reason),
+                Effect::Complete(completion) => self.complete(completion),
                 Effect::Store(record) => {
                     let (job, key) = record.key();
                     if let Err(refused) = self.commands.try_send(StoreCommand::Put(record)) {
@@ -204,6 +210,15 @@ impl Core {
                 Effect::Stop => self.stop(),
             }
         }
+    }
+
+    /// Completes an evaluation on a thread of its own. A job has at most one at a time.
+    fn complete(&self, completion: Completion) {
+        let events = self.events.clone();
+        tokio::task::spawn_blocking(move || {
+            // The receiver is gone when the coordinator has stopped.
+            drop(events.blocking_send(Event::Completed(completion.run())));
+        });
     }
 
     fn send(

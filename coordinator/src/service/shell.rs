@@ -115,8 +115,9 @@ pub async fn start(
     let failing = FailureReporter::new();
     let (messages, inbox) = mpsc::channel(EVENTS_MAX);
     let (events, from_store) = mpsc::channel(EVENTS_MAX);
-    let (commands, store) = thread::start(store, events, failing.guard(ComponentFailure::Store))
-        .map_err(|source| StartError::Thread { source })?;
+    let (commands, store) =
+        thread::start(store, events.clone(), failing.guard(ComponentFailure::Store))
+            .map_err(|source| StartError::Thread { source })?;
     let (policy, decided) = watch::channel(Arc::new(listener.policy.clone()));
     let (tls, shown) = listener.tls.clone().map(watch::channel).unzip();
     let router = services(&messages, &commands, decided, config).await?;
@@ -125,7 +126,7 @@ pub async fn start(
     let server = serve(router, listener, shown, stopped);
     let server = tokio::spawn(guarded(failing.guard(ComponentFailure::Server), server));
     let guard = failing.guard(ComponentFailure::Core);
-    let core = Core::new(state, clock, commands, failing.clone());
+    let core = Core::new(state, clock, commands, events, failing.clone());
     let core = core.run(effects, inbox, from_store, config.tick);
     let core = tokio::spawn(guarded(guard, core));
     tracing::info!(%url, "listening");

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use osteon_common::parameters::Point;
 use osteon_coordinator::config::Config;
+use osteon_coordinator::core::completion::Completion;
 use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::{Event, Hello, Request};
 use osteon_coordinator::core::ids::{BatchId, JobId, ReplyId, WorkerId};
@@ -64,6 +65,7 @@ enum Occurrence {
     Break(WorkerId),
     /// A record reaches the disk, or fails to.
     Write(Record),
+    Complete(Completion),
     /// An evaluation is read.
     Read(JobId, u64),
     /// Ended jobs are deleted.
@@ -167,6 +169,7 @@ impl World {
             store_retry: Duration::from_millis(300),
             audit_fraction: [0.0, 0.01, 0.3, 1.0][draw(4) as usize],
             ahead: draw(4) > 0,
+            completed_aside_min: [1, 20, u64::MAX][(seed % 3) as usize],
             speculation: draw(3) > 0,
             ..Config::default()
         };
@@ -285,6 +288,7 @@ impl World {
                 }
             }
             Occurrence::Write(record) => self.write(&record),
+            Occurrence::Complete(completion) => self.react(Event::Completed(completion.run())),
             Occurrence::Report(event) => self.react(event),
             Occurrence::Restart => {
                 self.counts.restarts += 1;
@@ -435,6 +439,7 @@ impl World {
                     self.look_at(&record);
                     self.within(20, Occurrence::Write(record));
                 }
+                Effect::Complete(completion) => self.within(20, Occurrence::Complete(completion)),
                 Effect::Read { job, number } => self.within(10, Occurrence::Read(job, number)),
                 Effect::Prune { reply_id, jobs } => {
                     self.within(20, Occurrence::Forget(reply_id, jobs))

@@ -20,6 +20,7 @@ use crate::core::sanity::sanity_check;
 
 mod ahead;
 mod checks;
+mod completion;
 mod dispatch;
 mod fairness;
 mod jobs;
@@ -214,6 +215,7 @@ fn described(effect: &Effect) -> String {
         Effect::Send { worker, batch, work } => {
             format!("send {worker}: batch {batch} = {}+{}", work.first, work.count)
         }
+        Effect::Complete(completion) => format!("complete an evaluation of job {}", completion.job),
         Effect::Revoke { worker, batch } => format!("revoke {worker}: batch {batch}"),
         Effect::Drain { worker } => format!("drain {worker}"),
         Effect::Note(notice) => format!("note {notice:?}"),

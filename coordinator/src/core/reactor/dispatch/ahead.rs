@@ -9,6 +9,8 @@
 //! [`refresh`] sees to it that a job with further parts always has something to send, and that no
 //! part begins before it is needed for that.
 
+use std::sync::Arc;
+
 use osteon_common::parameters::Point;
 use osteon_search::same_point;
 
@@ -20,6 +22,7 @@ use crate::core::ids::{BatchId, JobId};
 use crate::core::job::{Job, Stage};
 use crate::core::reactor::turn::Turn;
 use crate::core::worker_name::WorkerName;
+use crate::store::EvaluationRecord;
 
 /// Begins evaluations of further parts of a job's search until one waits to be sent.
 pub(crate) fn refresh(turn: &mut Turn, id: JobId) {
@@ -55,12 +58,22 @@ pub(crate) fn refresh(turn: &mut Turn, id: JobId) {
 
 /// Keeps the outcomes of a point that a job's search has asked for, if a branch waits for them: the
 /// searches for all groups begin at the same points.
-pub(crate) fn keep_if_awaited(job: &mut Job, point: &Point, prepared: Prepared) {
+pub(crate) fn keep_if_awaited(job: &mut Job, record: &EvaluationRecord) {
     let waits = |it: &FollowedBranch| {
-        it.evaluation.is_none() && it.branch.point().is_some_and(|at| same_point(&at, point))
+        it.evaluation.is_none()
+            && it.branch.point().is_some_and(|at| same_point(&at, &record.point))
     };
     if job.ahead.branches.iter().any(waits) {
-        job.ahead.prepare(point, prepared);
+        let prepared = Prepared {
+            part: None,
+            outcomes: Arc::clone(&record.outcomes),
+            estimated_error: record.estimated_error,
+            workers: record.workers.clone(),
+            assessment: None,
+            // The record is on its way to the store.
+            unsaved: None,
+        };
+        job.ahead.prepare(&record.point, prepared);
     }
 }
 
@@ -147,9 +160,10 @@ pub(crate) fn left(job: &Job) -> u64 {
 /// Returns whether parts of a job's search may be computed now.
 fn computes(job: &Job) -> bool {
     let under_way = match job.stage {
-        Stage::Computing(_) | Stage::StoringEvaluation { .. } | Stage::StoringPrepared { .. } => {
-            true
-        }
+        Stage::Computing(_)
+        | Stage::Completing(_)
+        | Stage::StoringEvaluation { .. }
+        | Stage::StoringPrepared { .. } => true,
         Stage::StoringSubmission
         | Stage::Waiting
         | Stage::Replaying { .. }

@@ -110,13 +110,18 @@ fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> 
         let specification = &job.record.specification;
         let realizations = specification.monte_carlo.realizations;
         match &job.stage {
-            Stage::StoringEvaluation { .. } if specification.kind == JobKind::Propagation => None,
+            Stage::Completing(_) | Stage::StoringEvaluation { .. }
+                if specification.kind == JobKind::Propagation =>
+            {
+                None
+            }
             Stage::Computing(evaluation) => {
                 let soon = etas.get(id).is_some_and(|eta| *eta < until);
                 soon.then_some(evaluation.filled())
             }
             Stage::StoringEvaluation { .. } if has_next(job) => None,
-            Stage::StoringEvaluation { .. }
+            Stage::Completing(_)
+            | Stage::StoringEvaluation { .. }
             | Stage::StoringPrepared { .. }
             | Stage::Replaying { .. } => Some(realizations),
             Stage::StoringSubmission | Stage::Waiting | Stage::StoringEnd(_) => None,

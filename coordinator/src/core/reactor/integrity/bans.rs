@@ -5,7 +5,7 @@ use crate::core::close_reason::CloseReason;
 use crate::core::effect::{Effect, Record};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{JobId, WorkerId};
-use crate::core::job::Stage;
+use crate::core::job::{Settled, Stage};
 use crate::core::reactor::dispatch::{ahead, batches, speculation};
 use crate::core::reactor::lifecycle::{jobs, records, replay, workers};
 use crate::core::reactor::turn::Turn;
@@ -50,10 +50,13 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     turn.state.changed.insert(id);
     let contributed = job.workers.contains(name);
     match &mut job.stage {
-        Stage::Computing(_) | Stage::Replaying { .. } if contributed => {
+        Stage::Computing(_) | Stage::Completing(_) | Stage::Replaying { .. } if contributed => {
             jobs::restart(turn, id);
         }
         Stage::Computing(evaluation) if evaluation.workers.contains(name) => {
+            compute_again(turn, id);
+        }
+        Stage::Completing(settled) if settled.workers.contains(name) => {
             compute_again(turn, id);
         }
         Stage::Computing(evaluation) => {
@@ -97,6 +100,7 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
         Stage::StoringSubmission
         | Stage::Waiting
         | Stage::Replaying { .. }
+        | Stage::Completing(_)
         | Stage::StoringEnd(_) => {}
     }
 }
@@ -109,12 +113,16 @@ fn compute_again(turn: &mut Turn, id: JobId) {
         return;
     };
     let realizations = job.record.specification.monte_carlo.realizations;
-    if let Stage::Computing(evaluation) = &mut job.stage {
-        let mut fresh =
-            PendingEvaluation::new(evaluation.number, attempt, evaluation.point, realizations);
-        fresh.stored = std::mem::take(&mut evaluation.stored);
-        *evaluation = fresh;
-    }
+    let (number, point, stored) = match &mut job.stage {
+        Stage::Computing(PendingEvaluation { number, point, stored, .. })
+        | Stage::Completing(Settled { number, point, stored, .. }) => {
+            (*number, *point, std::mem::take(stored))
+        }
+        _ => return,
+    };
+    let mut fresh = PendingEvaluation::new(number, attempt, point, realizations);
+    fresh.stored = stored;
+    job.stage = Stage::Computing(fresh);
 }
 
 /// Handles the report that the ban with this number is durable.

@@ -1,17 +1,18 @@
 //! Life cycle of a job, from acceptance to end.
 
 use std::cmp::Reverse;
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use osteon_common::results::Status;
 use osteon_common::version::Program;
 
 use crate::core::ahead::Prepared;
+use crate::core::completion::{Completed, Completion};
 use crate::core::effect::{Effect, Record};
+use crate::core::evaluation::PendingEvaluation;
 use crate::core::failure::RunFailure;
 use crate::core::ids::JobId;
-use crate::core::job::{Job, Stage};
+use crate::core::job::{Job, Settled, Stage};
 use crate::core::notice::Notice;
 use crate::core::reactor::dispatch::{ahead, batches, speculation};
 use crate::core::reactor::turn::Turn;
@@ -22,14 +23,20 @@ use osteon_search::{Ending, Search, Step};
 /// Maximum number of evaluations, and of realizations in them, that are stored together.
 const STORED_TOGETHER_MAX: (usize, usize) = (256, 1 << 20);
 
-/// Stores the evaluation of a job once it is complete and checked.
+/// Stores the evaluation of a job once it is complete and checked. A large one is completed beside
+/// the core first.
 pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
+    let aside_min = turn.state.config.completed_aside_min;
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     let Stage::Computing(evaluation) = &mut job.stage else {
         return;
     };
+    if evaluation.is_settled() && evaluation.realizations() >= aside_min {
+        complete_aside(turn, id);
+        return;
+    }
     let Some((outcomes, estimated_error)) = evaluation.complete() else {
         return;
     };
@@ -37,24 +44,55 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     // Only an evaluation that was stored before, with the same outcomes, leaves those after it
     // valid.
     let is_last = evaluation.diverges_from_store(&outcomes);
-    let workers: BTreeSet<_> = std::mem::take(&mut evaluation.workers).into_iter().collect();
-    let prepared = Prepared {
-        part: None,
-        outcomes: Arc::clone(&outcomes),
-        estimated_error,
-        workers: workers.clone(),
-        assessment: None,
-        // The search's own record is on its way to the store.
-        unsaved: None,
-    };
-    ahead::keep_if_awaited(job, &point, prepared);
+    let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
     let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
+    ahead::keep_if_awaited(job, &record);
     turn.effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
     let outcomes = record.outcomes.clone();
     job.stage = Stage::StoringEvaluation { record, is_last };
     if is_last {
         speculation::prepare(turn, id, &outcomes);
     }
+    ahead::refresh(turn, id);
+}
+
+/// Hands out the settled evaluation of a job to be completed beside the core.
+fn complete_aside(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let Stage::Computing(evaluation) = &mut job.stage else {
+        return;
+    };
+    let PendingEvaluation { number, attempt, point, .. } = *evaluation;
+    let (workers, stored) = (evaluation.workers.clone(), evaluation.stored.clone());
+    let settled = Settled { number, attempt, point, workers, stored };
+    let Stage::Computing(evaluation) =
+        std::mem::replace(&mut job.stage, Stage::Completing(settled))
+    else {
+        return;
+    };
+    let (evaluation, search) = (Box::new(evaluation), Box::new(job.search.clone()));
+    turn.effects.push(Effect::Complete(Completion { job: id, evaluation, search }));
+    ahead::refresh(turn, id);
+}
+
+/// Stores an evaluation that was completed beside the core.
+pub(crate) fn completed(turn: &mut Turn, completed: Completed) {
+    let Completed { job: id, attempt, record, after } = completed;
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    // Anything else was begun again, or has ended, meanwhile.
+    let awaited = matches!(&job.stage, Stage::Completing(settled) if settled.attempt == attempt);
+    let Some((record, is_last)) = record.filter(|_| awaited) else {
+        return;
+    };
+    ahead::keep_if_awaited(job, &record);
+    job.progressed = turn.now;
+    let records = vec![record];
+    turn.effects.push(Effect::Store(Record::of_evaluations(records.clone(), is_last)));
+    job.stage = Stage::StoringPrepared { records, is_last, after };
     ahead::refresh(turn, id);
 }
 
@@ -86,7 +124,9 @@ pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
             // its turn.
             begin(turn, id);
         }
-        Stage::Waiting | Stage::Computing(_) => finish(turn, id, cancelled()),
+        Stage::Waiting | Stage::Computing(_) | Stage::Completing(_) => {
+            finish(turn, id, cancelled());
+        }
         // The store cannot read the evaluations that would still belong to its output.
         Stage::Replaying { .. } if job.store_retry.is_some() => {
             finish(turn, id, cancelled());
@@ -218,9 +258,9 @@ fn store_prepared(turn: &mut Turn, id: JobId) -> bool {
             workers,
         });
     }
-    turn.effects.push(Effect::Store(Record::Evaluations(records.clone())));
+    turn.effects.push(Effect::Store(Record::of_evaluations(records.clone(), true)));
     job.progressed = turn.now;
-    job.stage = Stage::StoringPrepared { records, after };
+    job.stage = Stage::StoringPrepared { records, is_last: true, after };
     // Its candidates were those of another point.
     speculation::drop_all(turn, id);
     ahead::refresh(turn, id);

@@ -46,10 +46,10 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
                 jobs::advance(turn, id);
             }
         }
-        (RecordKey::Evaluation(number), Stage::StoringPrepared { records, after })
+        (RecordKey::Evaluation(number), Stage::StoringPrepared { records, is_last, after })
             if records.last().is_some_and(|last| last.number == number) =>
         {
-            job.stored = number + 1;
+            job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
             let workers = records.iter_mut().map(|record| std::mem::take(&mut record.workers));
             job.workers.extend(workers.flatten());
             job.store_retry = None;
@@ -125,8 +125,8 @@ pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
             let record = record.clone();
             Effect::Store(Record::Evaluation { record, is_last: *is_last })
         }
-        Stage::StoringPrepared { records, .. } => {
-            Effect::Store(Record::Evaluations(records.clone()))
+        Stage::StoringPrepared { records, is_last, .. } => {
+            Effect::Store(Record::of_evaluations(records.clone(), *is_last))
         }
         Stage::StoringEnd(end) => {
             let summary = Arc::new(job.search.summary());
@@ -138,7 +138,8 @@ pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
         Stage::StoringSubmission
         | Stage::Waiting
         | Stage::Replaying { asked: false }
-        | Stage::Computing(_) => return,
+        | Stage::Computing(_)
+        | Stage::Completing(_) => return,
     });
 }
 
@@ -190,7 +191,10 @@ impl Job {
                 records.last().map(|last| RecordKey::Evaluation(last.number))
             }
             Stage::StoringEnd(_) => Some(RecordKey::End),
-            Stage::Waiting | Stage::Replaying { .. } | Stage::Computing(_) => None,
+            Stage::Waiting
+            | Stage::Replaying { .. }
+            | Stage::Computing(_)
+            | Stage::Completing(_) => None,
         }
     }
 }
