@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use osteon_search::Summary;
 
-use super::{BanRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob};
+use super::{
+    BanRecord, Changes, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
+};
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
 
@@ -35,6 +37,10 @@ impl MemoryStore {
 }
 
 impl Store for MemoryStore {
+    fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError> {
+        changes(self)
+    }
+
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         let content = self.content();
         for (&id, job) in &content.jobs {

@@ -5,7 +5,7 @@
 //! `synchronous = FULL`, a record is on the disk before it is reported. Each row has a BLAKE3
 //! checksum of its other columns.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -18,8 +18,8 @@ use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::{
-    BanRecord, BetweenPieces, DamagedRecord, EndRecord, EvaluationRecord, JobRecord, Store,
-    StoreError, StoredJob,
+    BanRecord, BetweenPieces, Changes, DamagedRecord, EndRecord, EvaluationRecord, JobRecord,
+    Store, StoreError, StoredJob,
 };
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
@@ -27,6 +27,7 @@ use crate::core::worker_name::WorkerName;
 mod acknowledged;
 mod backup;
 mod columns;
+mod group;
 mod job_row;
 mod opening;
 mod schema;
@@ -54,6 +55,9 @@ pub struct SqliteStore {
     lock: File,
     /// Mark of the acknowledged jobs.
     mark: RefCell<Mark>,
+    /// While a group is put: the highest job in it, which the mark names once the group is durable;
+    /// 0 if there is none.
+    group: Cell<Option<JobId>>,
 }
 
 impl Drop for SqliteStore {
@@ -92,7 +96,7 @@ impl SqliteStore {
             never_again(&connection, last).map_err(|source| opening::refusal(&path, source))?;
         }
         let mark = RefCell::new(Mark::open(directory, &found, last)?);
-        Ok(Self { connection, path, lock, mark })
+        Ok(Self { connection, path, lock, mark, group: Cell::new(None) })
     }
 
     /// Creates a directory for a store, if there is none; other users cannot access it.
@@ -225,6 +229,10 @@ impl SqliteStore {
 }
 
 impl Store for &SqliteStore {
+    fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError> {
+        self.change_together(changes)
+    }
+
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         self.read_jobs("true", [], &mut |record| {
             let end = match self.end(record.job) {
@@ -302,14 +310,7 @@ impl Store for &SqliteStore {
             columns.name,
         ];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
-        // From here on the job counts as acknowledged; its client is answered after this.
-        self.mark.borrow_mut().acknowledge(record.job).inspect_err(|_| {
-            // The job is refused, but the mark may name it all the same. So the database records it
-            // as deleted; if that fails too, it stays as a job that nobody asks for.
-            if let Err(error) = self.remove_jobs(&[record.job]) {
-                tracing::error!(job = %record.job, %error, "a refused job stays in the store");
-            }
-        })
+        self.accept(record.job)
     }
 
     fn put_evaluation(
@@ -326,16 +327,14 @@ impl Store for &SqliteStore {
         let sql = "INSERT OR REPLACE INTO evaluation (job, number, point, outcomes, checksum,
                    estimated_error, workers) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
         let values = params![job.0, number, point, outcomes, checksum, errors, workers];
-        let put = || -> rusqlite::Result<()> {
-            let transaction = self.connection.unchecked_transaction()?;
-            transaction.execute(sql, values)?;
+        self.change(|connection| {
+            connection.execute(sql, values)?;
             if is_last {
                 let sql = "DELETE FROM evaluation WHERE job = ?1 AND number > ?2";
-                transaction.execute(sql, params![job.0, number])?;
+                connection.execute(sql, params![job.0, number])?;
             }
-            transaction.commit()
-        };
-        put().map_err(|source| self.refused(source))
+            Ok(())
+        })
     }
 
     fn finish_job(&mut self, record: &EndRecord, summary: &Summary) -> Result<(), StoreError> {
@@ -359,13 +358,10 @@ impl Store for &SqliteStore {
             record.program.numerics,
             record.program.commit,
         ];
-        let finish = || -> rusqlite::Result<()> {
-            let transaction = self.connection.unchecked_transaction()?;
-            transaction.execute(sql, values)?;
-            summary::put(&transaction, record.job, summary)?;
-            transaction.commit()
-        };
-        finish().map_err(|source| self.refused(source))
+        self.change(|connection| {
+            connection.execute(sql, values)?;
+            summary::put(connection, record.job, summary)
+        })
     }
 
     fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError> {

@@ -9,10 +9,15 @@ use super::SqliteStore;
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
 use crate::store::{
-    BanRecord, BetweenPieces, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
+    BanRecord, BetweenPieces, Changes, EndRecord, EvaluationRecord, JobRecord, Store, StoreError,
+    StoredJob,
 };
 
 impl Store for SqliteStore {
+    fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError> {
+        (&*self).together(changes)
+    }
+
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         (&*self).visit_jobs(visit)
     }
