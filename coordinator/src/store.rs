@@ -1,10 +1,11 @@
 //! The durable state of a coordinator: jobs, their evaluations and their ends.
 //!
 //! The interface is small and synchronous; one blocking thread calls it. Each `put` returns when
-//! the record is durable, and putting the same record again is not an error, so that a write whose
-//! answer was lost can be repeated.
+//! the record is durable, unless it is part of a group ([`Store::together`]). Putting the same
+//! record again is not an error, so that a write whose answer was lost can be repeated.
 
 mod error;
+pub(crate) mod group;
 pub mod job_output;
 pub mod memory;
 pub mod sqlite;
@@ -155,11 +156,22 @@ pub struct StoredJob {
     pub evaluations: u64,
 }
 
+/// Changes of a store that become durable together.
+pub type Changes<'a> = dyn FnMut(&mut dyn Store) -> Result<(), StoreError> + 'a;
+
 /// Callback between two pieces of a copy; `Break` ends the copy.
 pub type BetweenPieces<'a> = dyn FnMut(&mut dyn Store) -> ControlFlow<()> + 'a;
 
 /// Durable storage for jobs.
 pub trait Store {
+    /// Makes several records durable at once: calls `changes`, which puts them and stops at the first
+    /// that is refused. None is durable before this returns.
+    ///
+    /// # Errors
+    /// When a record is refused, or not all are durable. Some may be durable all the same, so put
+    /// each of them again to learn which.
+    fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError>;
+
     /// Returns all jobs, in the order of their identifiers.
     ///
     /// # Errors
@@ -246,7 +258,7 @@ pub trait Store {
     /// them.
     ///
     /// # Errors
-    /// When that is not durable. Some of them may be.
+    /// When that is not durable; some of them may be.
     fn put_evaluations(&mut self, records: &[EvaluationRecord]) -> Result<(), StoreError> {
         records.iter().try_for_each(|record| self.put_evaluation(record, true))
     }

@@ -5,7 +5,7 @@
 
 mod fake;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
@@ -15,14 +15,14 @@ use std::time::Duration;
 use osteon_common::job::JobSpecification;
 use osteon_common::version;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::core::effect::Effect;
+use osteon_coordinator::core::effect::{Answer, Effect};
 use osteon_coordinator::core::event::Event;
 use osteon_coordinator::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use osteon_coordinator::core::reactor::{Restored, react};
 use osteon_coordinator::core::state::State;
 use osteon_coordinator::store::job_output;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
-use osteon_coordinator::store::{EvaluationRecord, JobRecord, Store, StoreError};
+use osteon_coordinator::store::{EvaluationRecord, JobRecord, Store, StoreError, StoredJob};
 use osteon_proto::batch::Work;
 use osteon_search::{Search, Step};
 use tempfile::TempDir;
@@ -349,4 +349,142 @@ fn result(directory: &Path) -> String {
     assert_eq!(jobs.len(), 1);
     let left = job_output::read(&mut store, jobs[0].end.as_ref().unwrap());
     format!("{:?}", left.unwrap().result)
+}
+
+/// Time of a process's death, counted in groups of records.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum GroupDeath {
+    Before(u32),
+    /// Half of the records are put, and nothing is committed.
+    Within(u32),
+    /// Everything is durable, and nothing is reported.
+    After(u32),
+}
+
+/// The records of jobs that run at the same time are written in groups.
+#[test]
+fn killed_at_any_group_every_job_goes_on_to_its_result() {
+    let jobs: Vec<_> = (0..3).map(|seed| fake::identification(12, 3, seed)).collect();
+    let jobs = [jobs, (3..6).map(|seed| fake::propagation(12, seed)).collect()].concat();
+    let expected: Vec<_> = jobs.iter().map(|job| format!("{:?}", fake::plain_run(job))).collect();
+    for group in 1.. {
+        let deaths =
+            [GroupDeath::Before(group), GroupDeath::Within(group), GroupDeath::After(group)];
+        for death in deaths {
+            let directory = tempfile::tempdir().unwrap();
+            let (survived, told) = live_in_groups(directory.path(), &jobs, Some(death));
+            if survived {
+                // Submissions, evaluations of three, and ends: of all jobs together.
+                assert_eq!(group, 1 + 3 + 1 + 1, "{death:?}");
+                return;
+            }
+            let (survived, told_again) = live_in_groups(directory.path(), &jobs, None);
+            assert!(survived, "{death:?}");
+            for (request, job) in &told {
+                assert_eq!(told_again.get(request), Some(job), "{death:?}: {job} was accepted");
+            }
+            let mut store = SqliteStore::open(directory.path()).unwrap();
+            let ended = store.jobs().unwrap();
+            let result = |job: &StoredJob| {
+                let seed = job.record.specification.monte_carlo.seed;
+                let left = job_output::read(&mut store, job.end.as_ref().unwrap()).unwrap();
+                (seed, format!("{:?}", left.result))
+            };
+            let results: BTreeMap<u64, String> = ended.iter().map(result).collect();
+            assert_eq!(results.into_values().collect::<Vec<_>>(), expected, "{death:?}");
+        }
+    }
+}
+
+/// Runs a coordinator with one worker until all jobs have ended, or it is killed; returns which of
+/// the two, and the jobs that its clients were told.
+fn live_in_groups(
+    directory: &Path,
+    jobs: &[JobSpecification],
+    death: Option<GroupDeath>,
+) -> (bool, BTreeMap<ReplyId, JobId>) {
+    let mut store = SqliteStore::open(directory).unwrap();
+    let restored = Restored::load(&mut store).unwrap();
+    let (mut state, effects) = State::restore(Config::default(), restored, Duration::ZERO);
+    let submit = |(number, job): (u64, &JobSpecification)| Event::Requested {
+        reply_id: ReplyId(number),
+        request: fake::submission(job, &format!("request {number}")),
+    };
+    let mut events: VecDeque<Event> = (0..).zip(jobs).map(submit).collect();
+    events.push_back(fake::attached(1));
+    let (mut effects, mut told) = (VecDeque::from(effects), BTreeMap::new());
+    for group in 1.. {
+        let mut records = Vec::new();
+        while let Some(event) = events.pop_front() {
+            effects.extend(react(&mut state, event, Duration::ZERO));
+            while let Some(effect) = effects.pop_front() {
+                match effect {
+                    Effect::Send { worker, batch, work } => {
+                        events.push_back(Crew::ALONE.answer(worker, batch, &work));
+                    }
+                    Effect::Store(record) => records.push(record),
+                    Effect::Read { job, number } => {
+                        events.push_back(fake::read(&mut store, job, number));
+                    }
+                    Effect::Answer { reply_id, answer: Answer::Submitted(job) } => {
+                        told.insert(reply_id, job);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        if records.is_empty() {
+            break;
+        }
+        if death == Some(GroupDeath::Before(group)) {
+            return (false, told);
+        }
+        let written = store.together(&mut |store| {
+            for (number, record) in records.iter().enumerate() {
+                if death == Some(GroupDeath::Within(group)) && number >= records.len() / 2 {
+                    return Err(StoreError::NoFile);
+                }
+                events.push_back(fake::written(store, record));
+            }
+            Ok(())
+        });
+        if written.is_err() || death == Some(GroupDeath::After(group)) {
+            return (false, told);
+        }
+    }
+    (state.is_idle(), told)
+}
+
+/// Until it is committed, nothing of a group is there, wherever its write was torn.
+#[test]
+fn a_group_is_there_whole_or_not_at_all() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.put_job(&record(1)).unwrap();
+    let before = image(directory.path());
+    let mut images = Vec::new();
+    store
+        .together(&mut |store| {
+            for job in 2..=40 {
+                store.put_job(&record(job))?;
+                images.push(image(directory.path()));
+            }
+            Ok(())
+        })
+        .unwrap();
+    for image in images {
+        assert_eq!(numbers(&mut opened(&image, LostJobs::Refuse).1.unwrap()), [1]);
+    }
+    let whole = image(directory.path());
+    let all: Vec<u64> = (1..=40).collect();
+    assert_eq!(numbers(&mut opened(&whole, LostJobs::Refuse).1.unwrap()), all);
+    let [begin, end] = [&before, &whole].map(|image| part(&mut image.clone(), LOG).len());
+    assert!(end > begin + 10_000, "{begin} to {end}");
+    for cut in (begin..end).step_by(509) {
+        let mut torn = whole.clone();
+        part(&mut torn, LOG).truncate(cut);
+        // The mark is written after the group.
+        *part(&mut torn, MARK) = part(&mut before.clone(), MARK).clone();
+        assert_eq!(numbers(&mut opened(&torn, LostJobs::Refuse).1.unwrap()), [1], "{cut}");
+    }
 }

@@ -14,7 +14,8 @@ use osteon_coordinator::core::worker_name::WorkerName;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::store::{
-    BanRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store, StoreError, StoredJob,
+    BanRecord, Changes, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store, StoreError,
+    StoredJob,
 };
 use osteon_coordinator::{ComponentFailure, Config, Coordinator, Listener, start};
 use osteon_proto::announced::Received;
@@ -326,6 +327,10 @@ struct BrokenStore {
 }
 
 impl Store for BrokenStore {
+    fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError> {
+        changes(self)
+    }
+
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         self.sound.visit_jobs(visit)
     }

@@ -39,6 +39,7 @@ const BENCH: &[Cargo] = &[
     &["bench", "--package", "osteon-solver", "--bench", "table"],
     &["bench", "--package", "osteon", "--bench", "end_to_end"],
     &["bench", "--package", "osteon", "--bench", "dispatch"],
+    &["bench", "--package", "osteon", "--bench", "jobs"],
     &["bench", "--package", "osteon-coordinator", "--bench", "fleet"],
 ];
 

@@ -6,7 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use osteon_search::{Summary, same_point};
 
 use super::{
-    BanRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store, StoreError, StoredJob,
+    BanRecord, Changes, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store, StoreError,
+    StoredJob,
 };
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
@@ -38,6 +39,10 @@ impl MemoryStore {
 }
 
 impl Store for MemoryStore {
+    fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError> {
+        changes(self)
+    }
+
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         let content = self.content();
         for (&id, job) in &content.jobs {

@@ -5,7 +5,7 @@
 //! `synchronous = FULL`, a record is on the disk before it is reported. Each row has a BLAKE3
 //! checksum of its other columns.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -18,8 +18,8 @@ use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::{
-    BanRecord, BetweenPieces, DamagedRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord,
-    Store, StoreError, StoredJob,
+    BanRecord, BetweenPieces, Changes, DamagedRecord, EndRecord, EvaluationRecord, JobRecord,
+    PartRecord, Store, StoreError, StoredJob,
 };
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
@@ -27,6 +27,7 @@ use crate::core::worker_name::WorkerName;
 mod acknowledged;
 mod backup;
 mod columns;
+mod group;
 mod job_row;
 mod opening;
 mod parts;
@@ -55,6 +56,9 @@ pub struct SqliteStore {
     lock: File,
     /// Mark of the acknowledged jobs.
     mark: RefCell<Mark>,
+    /// While a group is put: the highest job in it, which the mark names once the group is durable;
+    /// 0 if there is none.
+    group: Cell<Option<JobId>>,
 }
 
 impl Drop for SqliteStore {
@@ -93,7 +97,7 @@ impl SqliteStore {
             never_again(&connection, last).map_err(|source| opening::refusal(&path, source))?;
         }
         let mark = RefCell::new(Mark::open(directory, &found, last)?);
-        Ok(Self { connection, path, lock, mark })
+        Ok(Self { connection, path, lock, mark, group: Cell::new(None) })
     }
 
     /// Creates a directory for a store, if there is none; other users cannot access it.
@@ -226,6 +230,10 @@ impl SqliteStore {
 }
 
 impl Store for &SqliteStore {
+    fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError> {
+        self.change_together(changes)
+    }
+
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         self.read_jobs("true", [], &mut |record| {
             let end = match self.end(record.job) {
@@ -304,14 +312,7 @@ impl Store for &SqliteStore {
             columns.name,
         ];
         self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
-        // From here on the job counts as acknowledged; its client is answered after this.
-        self.mark.borrow_mut().acknowledge(record.job).inspect_err(|_| {
-            // The job is refused, but the mark may name it all the same. So the database records it
-            // as deleted; if that fails too, it stays as a job that nobody asks for.
-            if let Err(error) = self.remove_jobs(&[record.job]) {
-                tracing::error!(job = %record.job, %error, "a refused job stays in the store");
-            }
-        })
+        self.accept(record.job)
     }
 
     fn put_evaluation(
@@ -328,26 +329,26 @@ impl Store for &SqliteStore {
         let sql = "INSERT OR REPLACE INTO evaluation (job, number, point, outcomes, checksum,
                    estimated_error, workers) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
         let values = params![job.0, number, &point, outcomes, checksum, errors, workers];
-        let put = || -> rusqlite::Result<()> {
-            let transaction = self.connection.unchecked_transaction()?;
-            transaction.execute(sql, values)?;
-            parts::delete_at(&transaction, job, &point)?;
+        self.change(|connection| {
+            connection.execute(sql, values)?;
+            parts::delete_at(connection, job, &point)?;
             if is_last {
                 let sql = "DELETE FROM evaluation WHERE job = ?1 AND number > ?2";
-                transaction.execute(sql, params![job.0, number])?;
+                connection.execute(sql, params![job.0, number])?;
             }
-            transaction.commit()
+            Ok(())
+        })
+    }
+
+    fn put_evaluations(&mut self, records: &[EvaluationRecord]) -> Result<(), StoreError> {
+        let mut put = |store: &mut dyn Store| {
+            records.iter().try_for_each(|record| store.put_evaluation(record, true))
         };
-        put().map_err(|source| self.refused(source))
+        if self.group.get().is_some() { put(self) } else { self.change_together(&mut put) }
     }
 
     fn put_part(&mut self, record: &PartRecord) -> Result<(), StoreError> {
-        let put = || -> rusqlite::Result<()> {
-            let transaction = self.connection.unchecked_transaction()?;
-            parts::put(&transaction, record)?;
-            transaction.commit()
-        };
-        put().map_err(|source| self.refused(source))
+        self.change(|connection| parts::put(connection, record))
     }
 
     fn parts(&mut self, job: JobId) -> Result<Vec<PartRecord>, StoreError> {
@@ -375,14 +376,11 @@ impl Store for &SqliteStore {
             record.program.numerics,
             record.program.commit,
         ];
-        let finish = || -> rusqlite::Result<()> {
-            let transaction = self.connection.unchecked_transaction()?;
-            transaction.execute(sql, values)?;
-            summary::put(&transaction, record.job, summary)?;
-            parts::delete_of(&transaction, record.job)?;
-            transaction.commit()
-        };
-        finish().map_err(|source| self.refused(source))
+        self.change(|connection| {
+            connection.execute(sql, values)?;
+            summary::put(connection, record.job, summary)?;
+            parts::delete_of(connection, record.job)
+        })
     }
 
     fn summary(&mut self, job: JobId) -> Result<Option<Summary>, StoreError> {

@@ -1,5 +1,6 @@
-//! The only thread that uses the store. Records are written in the order of their arrival, and each
-//! is reported as an event; the output of ended jobs is read for the clients that fetch it.
+//! The only thread that uses the store. Records are written in the order of their arrival, those that
+//! wait together as a group, and each is reported as an event; the output of ended jobs is read for
+//! the clients that fetch it.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -14,13 +15,15 @@ use crate::core::effect::Record;
 use crate::core::event::{Event, ReadFailure};
 use crate::core::ids::{JobId, ReplyId};
 use crate::service::failing::Guard;
+use crate::store::group::Group;
 use crate::store::job_output::ReadRequest;
-use crate::store::{BanRecord, Store, StoreError};
+use crate::store::{Store, StoreError};
 
 /// Maximum number of waiting commands: a record for every job, and some reads.
 const COMMANDS_MAX: usize = JOBS_MAX + 64;
 
-/// Maximum number of commands that run between two pieces of a copy, so that the copy finishes.
+/// Maximum number of commands, or groups of records, that run between two pieces of a copy, so that
+/// the copy finishes.
 const COMMANDS_BETWEEN: usize = 64;
 
 /// A command for the store.
@@ -60,27 +63,65 @@ pub(crate) fn serve(
     commands: &mut mpsc::Receiver<StoreCommand>,
     events: &mpsc::Sender<Event>,
 ) {
+    let mut inbox = Inbox { commands, next: None };
     let mut desk = PendingWork { events, readings: VecDeque::new(), copies: VecDeque::new() };
     loop {
         let command = if desk.readings.is_empty() && desk.copies.is_empty() {
-            match commands.blocking_recv() {
+            match inbox.wait() {
                 Some(command) => Some(command),
                 None => return,
             }
         } else {
-            commands.try_recv().ok()
+            inbox.take().ok()
         };
         let others_first = matches!(command, Some(StoreCommand::Fetch(_)));
         if let Some(command) = command {
-            desk.run(store, command);
+            desk.run(store, &mut inbox, command);
         }
         if others_first {
             continue;
         }
         desk.read_on(store);
         if let Some(reply) = desk.copies.pop_front() {
-            desk.copy(store, commands, reply);
+            desk.copy(store, &mut inbox, reply);
         }
+    }
+}
+
+/// Commands in the order of their arrival.
+struct Inbox<'a> {
+    commands: &'a mut mpsc::Receiver<StoreCommand>,
+    /// Taken from `commands`, and run before those.
+    next: Option<StoreCommand>,
+}
+
+impl Inbox<'_> {
+    /// Waits for a command; `None` when every sender is gone.
+    fn wait(&mut self) -> Option<StoreCommand> {
+        self.next.take().or_else(|| self.commands.blocking_recv())
+    }
+
+    /// Returns a command that has arrived.
+    fn take(&mut self) -> Result<StoreCommand, TryRecvError> {
+        self.next.take().map_or_else(|| self.commands.try_recv(), Ok)
+    }
+
+    /// Returns a record with those that have arrived after it, as many as fit in a group. It does not
+    /// wait for more: while a group is written, the records of the next one arrive. A command that
+    /// depends on the order ends the group; fetches, which let others go first, join `readings`.
+    fn group(&mut self, first: Record, readings: &mut VecDeque<ReadRequest>) -> Group {
+        let mut group = Group::new(first);
+        while self.next.is_none() && !group.is_full() {
+            match self.commands.try_recv() {
+                Ok(StoreCommand::Put(record)) => {
+                    self.next = group.add(record).map(StoreCommand::Put);
+                }
+                Ok(StoreCommand::Fetch(reading)) => readings.push_back(reading),
+                Ok(other) => self.next = Some(other),
+                Err(_) => break,
+            }
+        }
+        group
     }
 }
 
@@ -97,10 +138,13 @@ struct PendingWork<'a> {
 }
 
 impl PendingWork<'_> {
-    fn run(&mut self, store: &mut dyn Store, command: StoreCommand) {
+    fn run(&mut self, store: &mut dyn Store, inbox: &mut Inbox<'_>, command: StoreCommand) {
         match command {
-            // The receiver is gone when the coordinator has stopped.
-            StoreCommand::Put(record) => drop(self.events.blocking_send(put(store, &record))),
+            StoreCommand::Put(record) => {
+                // The receiver is gone when the coordinator has stopped.
+                let mut report = |event| drop(self.events.blocking_send(event));
+                inbox.group(record, &mut self.readings).write(store, &mut report);
+            }
             StoreCommand::Read { job, number } => {
                 let found = store.evaluation(job, number).map_err(|error| unread(job, error));
                 drop(self.events.blocking_send(Event::Read { job, number, found }));
@@ -122,16 +166,11 @@ impl PendingWork<'_> {
     }
 
     /// Copies the store, and runs waiting commands between two pieces.
-    fn copy(
-        &mut self,
-        store: &mut dyn Store,
-        commands: &mut mpsc::Receiver<StoreCommand>,
-        reply: CopyReply,
-    ) {
+    fn copy(&mut self, store: &mut dyn Store, inbox: &mut Inbox<'_>, reply: CopyReply) {
         let copied = store.copy(&mut |store: &mut dyn Store| {
             for _ in 0..COMMANDS_BETWEEN {
-                match commands.try_recv() {
-                    Ok(command) => self.run(store, command),
+                match inbox.take() {
+                    Ok(command) => self.run(store, inbox, command),
                     Err(TryRecvError::Empty) => break,
                     // The coordinator is stopping.
                     Err(TryRecvError::Disconnected) => return ControlFlow::Break(()),
@@ -157,36 +196,4 @@ fn unread(job: JobId, error: StoreError) -> ReadFailure {
             ReadFailure::Refused { error: error.to_string() }
         }
     }
-}
-
-fn put(store: &mut dyn Store, record: &Record) -> Event {
-    let (job, key) = record.key();
-    let done = match record {
-        Record::Job(record) => store.put_job(record),
-        Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
-        Record::Evaluations(records) => store.put_evaluations(records),
-        Record::Part(record) => store.put_part(record),
-        Record::End { end, summary } => store.finish_job(end, summary),
-        Record::Ban(record) => ban(store, record),
-    };
-    match done {
-        Ok(()) => Event::Stored { job, key },
-        Err(error) => {
-            tracing::warn!(%job, %error, "a record could not be stored");
-            Event::StoreFailed { job, key, error: error.to_string() }
-        }
-    }
-}
-
-/// Stores a ban, and logs the ended jobs whose results can no longer be relied on.
-fn ban(store: &mut dyn Store, record: &BanRecord) -> Result<(), StoreError> {
-    store.put_ban(record)?;
-    // Logging is a courtesy: if its query fails, the stored ban remains.
-    let ended = store.ended_jobs_of(&record.worker).unwrap_or_default();
-    if !ended.is_empty() {
-        let jobs: Vec<String> = ended.iter().map(JobId::to_string).collect();
-        tracing::error!(worker = %record.worker, jobs = jobs.join(" "),
-            "these jobs ended before the worker was found to compute wrongly; run them again");
-    }
-    Ok(())
 }

@@ -9,11 +9,15 @@ use super::SqliteStore;
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
 use crate::store::{
-    BanRecord, BetweenPieces, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store,
+    BanRecord, BetweenPieces, Changes, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store,
     StoreError, StoredJob,
 };
 
 impl Store for SqliteStore {
+    fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError> {
+        (&*self).together(changes)
+    }
+
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         (&*self).visit_jobs(visit)
     }
@@ -44,6 +48,10 @@ impl Store for SqliteStore {
         is_last: bool,
     ) -> Result<(), StoreError> {
         (&*self).put_evaluation(record, is_last)
+    }
+
+    fn put_evaluations(&mut self, records: &[EvaluationRecord]) -> Result<(), StoreError> {
+        (&*self).put_evaluations(records)
     }
 
     fn put_part(&mut self, record: &PartRecord) -> Result<(), StoreError> {

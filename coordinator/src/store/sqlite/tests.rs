@@ -16,6 +16,7 @@ use super::opening::{FILE, Journal, open_file};
 use super::*;
 
 mod damage;
+mod groups;
 mod parts;
 
 pub(super) fn job(id: u64) -> JobRecord {
@@ -335,21 +336,26 @@ fn a_database_of_another_program_is_left_as_it_is() {
     assert_eq!(fs::read(&path).unwrap(), before);
 }
 
+/// Opens a file that was created with a write-ahead log as on a network file system.
+fn with_rollback_journal(directory: &Path) -> SqliteStore {
+    let path = directory.join(FILE);
+    let (connection, ()) = open_file(&path, Journal::Rollback, |_, _| Ok(())).unwrap();
+    let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
+    assert_eq!(mode, "delete");
+    let lock = tempfile::tempfile().unwrap();
+    let found = Mark::find(directory).unwrap();
+    let last = last_known(&connection).unwrap();
+    let mark = Mark::open(directory, &found, last).unwrap().into();
+    SqliteStore { connection, path, lock, mark, group: Cell::new(None) }
+}
+
 #[test]
 fn with_a_rollback_journal_everything_is_the_same() {
     let directory = tempfile::tempdir().unwrap();
     let mut store = SqliteStore::open(directory.path()).unwrap();
     store.put_job(&job(1)).unwrap();
-    let path = store.path.clone();
     drop(store);
-    // A file that was created with a write-ahead log, and is now opened as on a network file
-    // system.
-    let (connection, ()) = open_file(&path, Journal::Rollback, |_, _| Ok(())).unwrap();
-    let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
-    assert_eq!(mode, "delete");
-    let lock = tempfile::tempfile().unwrap();
-    let mark = Mark::open(directory.path(), &MarkFile::Nothing, 0).unwrap();
-    let mut store = SqliteStore { connection, path, lock, mark: mark.into() };
+    let mut store = with_rollback_journal(directory.path());
     store.put_evaluation(&evaluation(1, 0), true).unwrap();
     assert_eq!(store.jobs().unwrap()[0].evaluations, 1);
     assert_eq!(evaluations(&mut store, 1).unwrap(), [evaluation(1, 0)]);

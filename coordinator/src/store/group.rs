@@ -1,0 +1,126 @@
+//! Records that are written together: many small ones share one sync. Each is reported with its own
+//! outcome, in the order of arrival, and not before it is durable.
+
+use osteon_common::job::{Data, VelocitySet};
+
+use crate::core::effect::Record;
+use crate::core::event::Event;
+use crate::core::ids::JobId;
+use crate::store::{BanRecord, Store, StoreError};
+
+/// Maximum number of records in a group.
+pub(crate) const GROUP_RECORDS_MAX: usize = 256;
+/// Maximum size of a group of several records, bytes: a large record is written alone, so that small
+/// ones do not wait for it.
+const GROUP_BYTES_MAX: usize = 4 << 20;
+/// Approximate size of a record without its lists, bytes.
+const RECORD_BYTES: usize = 1 << 10;
+
+/// Records in the order of arrival; at least one.
+pub(crate) struct Group {
+    records: Vec<Record>,
+    bytes: usize,
+}
+
+impl Group {
+    pub(crate) fn new(first: Record) -> Self {
+        Self { bytes: bytes(&first), records: vec![first] }
+    }
+
+    /// Adds a record; returns it if there is no room for it.
+    pub(crate) fn add(&mut self, record: Record) -> Option<Record> {
+        let more = bytes(&record);
+        if self.is_full() || self.bytes + more > GROUP_BYTES_MAX {
+            return Some(record);
+        }
+        self.bytes += more;
+        self.records.push(record);
+        None
+    }
+
+    pub(crate) fn is_full(&self) -> bool {
+        self.records.len() >= GROUP_RECORDS_MAX || self.bytes >= GROUP_BYTES_MAX
+    }
+
+    /// Makes the records durable, and reports each of them.
+    pub(crate) fn write(&self, store: &mut dyn Store, report: &mut dyn FnMut(Event)) {
+        write(store, &self.records, report);
+    }
+}
+
+/// Writes records together or, if that fails, each half by itself: in the end a record that cannot be
+/// written is alone, and fails alone.
+fn write(store: &mut dyn Store, records: &[Record], report: &mut dyn FnMut(Event)) {
+    if let [record] = records {
+        report(outcome(record, put(store, record)));
+        return;
+    }
+    match store.together(&mut |store| records.iter().try_for_each(|record| put(store, record))) {
+        Ok(()) => records.iter().for_each(|record| report(outcome(record, Ok(())))),
+        Err(error) => {
+            tracing::debug!(records = records.len(), %error, "records are written in two halves");
+            let (first, second) = records.split_at(records.len() / 2);
+            write(store, first, report);
+            write(store, second, report);
+        }
+    }
+}
+
+fn outcome(record: &Record, put: Result<(), StoreError>) -> Event {
+    let (job, key) = record.key();
+    match put {
+        Ok(()) => Event::Stored { job, key },
+        Err(error) => {
+            tracing::warn!(%job, %error, "a record could not be stored");
+            Event::StoreFailed { job, key, error: error.to_string() }
+        }
+    }
+}
+
+fn put(store: &mut dyn Store, record: &Record) -> Result<(), StoreError> {
+    match record {
+        Record::Job(record) => store.put_job(record),
+        Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
+        Record::Evaluations(records) => store.put_evaluations(records),
+        Record::Part(record) => store.put_part(record),
+        Record::End { end, summary } => store.finish_job(end, summary),
+        Record::Ban(record) => ban(store, record),
+    }
+}
+
+/// Returns the approximate size of a record, bytes.
+fn bytes(record: &Record) -> usize {
+    let of_set =
+        |set: VelocitySet<'_>| size_of_val(set.velocities) + set.subjects.map_or(0, size_of_val);
+    let of_data = |data: &Data| -> usize {
+        (0..data.sets()).filter_map(|set| data.set(set)).map(of_set).sum()
+    };
+    RECORD_BYTES
+        + match record {
+            Record::Job(record) => record.specification.data.as_ref().map_or(0, of_data),
+            Record::Evaluation { record, .. } => size_of_val(&*record.outcomes),
+            Record::Evaluations(records) => {
+                records.iter().map(|it| RECORD_BYTES + size_of_val(&*it.outcomes)).sum()
+            }
+            Record::Part(record) => {
+                record.pieces.iter().map(|piece| RECORD_BYTES + size_of_val(&*piece.results)).sum()
+            }
+            Record::End { summary, .. } => {
+                size_of_val(&*summary.history) + size_of_val(&*summary.groups)
+            }
+            Record::Ban(_) => 0,
+        }
+}
+
+/// Stores a ban, and logs the ended jobs whose results can no longer be relied on.
+fn ban(store: &mut dyn Store, record: &BanRecord) -> Result<(), StoreError> {
+    store.put_ban(record)?;
+    // Logging is a courtesy: if its query fails, the stored ban remains.
+    let ended = store.ended_jobs_of(&record.worker).unwrap_or_default();
+    if !ended.is_empty() {
+        let jobs: Vec<String> = ended.iter().map(JobId::to_string).collect();
+        tracing::error!(worker = %record.worker, jobs = jobs.join(" "),
+            "these jobs ended before the worker was found to compute wrongly; run them again");
+    }
+    Ok(())
+}
