@@ -28,6 +28,7 @@ mod overdue;
 mod prune;
 mod replay;
 mod speculation;
+mod tally;
 mod workers;
 
 /// One minute.
@@ -249,6 +250,7 @@ fn answered(answer: &Answer) -> String {
             let jobs: Vec<&str> = snapshots.iter().map(|snapshot| snapshot.job.as_str()).collect();
             format!("{jobs:?}, more after {more_after:?}")
         }
+        Answer::Explained(explained) => format!("{:?}", explained.reason()),
         Answer::Ended(end) => format!("ended {}", end.job),
         Answer::Pruned(jobs) => format!("pruned {}", jobs.len()),
         Answer::Banned(banned) => format!("banned {}", banned.len()),
