@@ -6,7 +6,6 @@ use std::time::Duration;
 use anyhow::anyhow;
 use osteon_common::job::JobKind;
 use osteon_proto::credentials::{CredentialFiles, Credentials};
-use osteon_proto::endpoint::Endpoint;
 use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
@@ -258,14 +257,7 @@ impl Resolved {
                 Self::Observe { arguments, isa: isa()?, threads }
             }
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
-            Command::Worker(arguments) => {
-                let endpoint = environment.needed(arguments.coordinator.clone())?;
-                let given = arguments.credentials.clone().into();
-                let (files, unused) = environment.files(given, &endpoint);
-                let config = resolve_worker(&arguments, endpoint, cores, isa()?);
-                let log_format = arguments.log_format;
-                Self::Worker { config, files, unused, log_format }
-            }
+            Command::Worker(arguments) => resolve_worker(arguments, &environment, cores, isa()?)?,
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
@@ -394,19 +386,22 @@ fn resolve_workers(
 }
 
 fn resolve_worker(
-    arguments: &WorkerArguments,
-    endpoint: Endpoint,
+    arguments: WorkerArguments,
+    environment: &Environment,
     cores: u32,
     isa: Isa,
-) -> WorkerConfig {
-    WorkerConfig {
+) -> Result<Resolved, CommandFailure> {
+    let endpoint = environment.needed(arguments.coordinator)?;
+    let (files, unused) = environment.files(arguments.credentials.into(), &endpoint);
+    let config = WorkerConfig {
         endpoint,
         credentials: Credentials::default(),
         threads: arguments.threads.unwrap_or(cores),
         isa,
         give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),
         time_limit: arguments.time_limit.map(Duration::from_secs_f64),
-    }
+    };
+    Ok(Resolved::Worker { config, files, unused, log_format: arguments.log_format })
 }
 
 impl From<CredentialArguments> for CredentialFiles {

@@ -2,6 +2,7 @@
 //! rules use.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+#![expect(clippy::panic, reason = "a test that cannot go on should say why")]
 
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
@@ -13,14 +14,22 @@ use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::path::Path;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use support::{Owned, Scratch, job, osteon, run, text};
 
-/// Names the file for the scraped text, which `cargo xtask metrics` gives to promtool.
-const SCRAPE_FILE: &str = "OSTEON_SCRAPE_FILE";
+/// Names the directory for what `cargo xtask metrics` gives to promtool: the scraped text, and the
+/// expressions of the dashboard as rules.
+const DIRECTORY: &str = "OSTEON_METRICS_DIRECTORY";
 
 fn read(path: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+}
+
+/// Writes a file for promtool, if it is wanted.
+fn keep(name: &str, text: &str) {
+    if let Some(directory) = std::env::var_os(DIRECTORY) {
+        fs::write(Path::new(&directory).join(name), text).unwrap();
+    }
 }
 
 /// A coordinator with metrics on a port of its own.
@@ -173,9 +182,7 @@ fn every_metric_of_a_run_is_documented_and_every_documented_one_is_exported() {
     let version = exported.get_mut("osteon_build_info").unwrap().1.get_mut("version").unwrap();
     assert_eq!(std::mem::take(version), BTreeSet::from([env!("CARGO_PKG_VERSION").to_owned()]));
     assert_eq!(exported, documented());
-    if let Some(file) = std::env::var_os(SCRAPE_FILE) {
-        fs::write(file, scraped).unwrap();
-    }
+    keep("scraped.txt", &scraped);
     drop(worker);
 }
 
@@ -185,14 +192,13 @@ fn the_dashboard_and_the_alerts_use_exported_metrics_only() {
     let dashboard: Value = serde_json::from_str(&read("deploy/grafana/osteon.json")).unwrap();
     let variables = dashboard["templating"]["list"].as_array().unwrap();
     assert!(variables.iter().any(|it| it["type"] == "datasource" && it["name"] == "datasource"));
-    let mut expressions = String::new();
+    let mut expressions = Vec::new();
     let mut nodes = vec![&dashboard];
     while let Some(node) = nodes.pop() {
         match node {
             Value::Object(fields) => {
                 if let Some(expression) = fields.get("expr") {
-                    expressions.push_str(expression.as_str().unwrap());
-                    expressions.push('\n');
+                    expressions.push(expression.as_str().unwrap());
                 }
                 // Every panel and query follows the variable.
                 if let Some(uid) = fields.get("datasource").and_then(|source| source.get("uid")) {
@@ -204,9 +210,19 @@ fn the_dashboard_and_the_alerts_use_exported_metrics_only() {
             _ => {}
         }
     }
+    // The syntax of a rule has no variables. JSON is YAML.
+    let rule = |(number, expression): (usize, &&str)| {
+        let plain = expression.replace("$__rate_interval", "5m");
+        let plain = plain.replace("$job", ".*").replace("$instance", ".*");
+        json!({ "record": format!("dashboard:{number}"), "expr": plain })
+    };
+    let rules: Vec<Value> = expressions.iter().enumerate().map(rule).collect();
+    let rules = json!({ "groups": [{ "name": "dashboard", "rules": rules }] });
+    keep("dashboard.yml", &rules.to_string());
     let rules = read("deploy/prometheus/alerts.yml");
     let rules: String = rules.lines().filter(|line| !line.trim().starts_with('#')).collect();
-    for (what, text, at_least) in [("dashboard", expressions, 25), ("alerts", rules, 10)] {
+    for (what, text, at_least) in [("dashboard", expressions.join("\n"), 25), ("alerts", rules, 10)]
+    {
         let used = named(&text);
         assert!(used.len() >= at_least, "{what}: {used:?}");
         let unknown: Vec<&String> = used.iter().filter(|name| !is_exported(name, &all)).collect();

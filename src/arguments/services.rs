@@ -105,7 +105,7 @@ pub(crate) enum LogFormat {
     Json,
 }
 
-fn lease(text: &str) -> Result<Duration, String> {
+pub(super) fn lease(text: &str) -> Result<Duration, String> {
     match text.parse::<f64>() {
         Ok(number) if (1.0..=3600.0).contains(&number) => Ok(Duration::from_secs_f64(number)),
         _ => Err("it must be a number from 1 to 3600 (s)".to_owned()),

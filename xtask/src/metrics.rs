@@ -14,11 +14,13 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
     if !words.is_empty() {
         bail!("usage: cargo xtask metrics");
     }
-    let scraped = programs()?.with_file_name("metrics.txt");
-    // An earlier run's would be checked if the test wrote none.
-    drop(fs::remove_file(&scraped));
+    let directory = programs()?.with_file_name("metrics");
+    // The files of an earlier run would be checked if the tests wrote none.
+    drop(fs::remove_dir_all(&directory));
+    let uncreated = || format!("cannot create {}", directory.display());
+    fs::create_dir_all(&directory).with_context(uncreated)?;
     let mut test = cargo_command(&["test", "--workspace", "--test", "metrics"]);
-    cargo(test.env("OSTEON_SCRAPE_FILE", &scraped))?;
+    cargo(test.env("OSTEON_METRICS_DIRECTORY", &directory))?;
     let Some(promtool) = promtool()? else {
         eprintln!(
             "rules and metrics are not checked by promtool, which is not found (on Debian it is in \
@@ -31,8 +33,10 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
         command.args(arguments).current_dir(root().join("deploy/prometheus"));
         command
     };
-    let file = File::open(&scraped).context("the test has scraped nothing")?;
-    cargo(promtool(&["check", "metrics"]).stdin(file))?;
+    let scraped = directory.join("scraped.txt");
+    let scraped = File::open(&scraped).context("the tests have scraped nothing")?;
+    cargo(promtool(&["check", "metrics"]).stdin(scraped))?;
+    cargo(promtool(&["check", "rules"]).arg(directory.join("dashboard.yml")))?;
     cargo(&mut promtool(&["check", "rules", "alerts.yml"]))?;
     cargo(&mut promtool(&["test", "rules", "alerts_test.yml"]))
 }

@@ -70,10 +70,11 @@ fn reason(facts: &JobFacts) -> PaceReason {
 
 /// Returns the expected time of the evaluation under way.
 fn expected(reason: PaceReason, facts: &JobFacts) -> Option<Duration> {
-    let runs = matches!(
-        reason,
-        PaceReason::OtherJobs | PaceReason::FewRealizations | PaceReason::Computing
-    );
+    let runs = matches!(facts.standing, Standing::Computing)
+        && matches!(
+            reason,
+            PaceReason::OtherJobs | PaceReason::FewRealizations | PaceReason::Computing
+        );
     // A rate may be tiny; what does not fit into a duration is not foreseeable.
     let seconds = facts.left() as f64 / facts.rate;
     (runs && facts.rate > 0.0).then(|| Duration::try_from_secs_f64(seconds).ok()).flatten()
@@ -112,10 +113,10 @@ fn text(reason: PaceReason, facts: &JobFacts) -> String {
             continues the job."
             .to_owned(),
         PaceReason::WaitingForTurn => format!(
-            "It has been waiting for its turn for {since}: {} run and {} wait. Jobs of users with the fewest \
-             running jobs begin first, of these the highest priority, then the oldest.",
+            "It has been waiting for its turn for {since}, with {} running and {} waiting. Jobs of users \
+             with the fewest running jobs begin first, of these the highest priority, then the oldest.",
             jobs(facts.running),
-            jobs(facts.waiting)
+            facts.waiting
         ),
         PaceReason::ReadingStore => match facts.standing {
             Standing::Reading { read, stored } => format!(
@@ -184,10 +185,9 @@ fn last(facts: &JobFacts, oldest: &OldestBatch) -> String {
 
 fn others(facts: &JobFacts) -> String {
     let why = if facts.higher > 0 {
-        format!(
-            "{} of the same user have a higher priority and are served first.",
-            jobs(facts.higher)
-        )
+        let (have, are) = if facts.higher == 1 { ("has", "is") } else { ("have", "are") };
+        let higher = jobs(facts.higher);
+        format!("{higher} of the same user {have} a higher priority and {are} served first.")
     } else if facts.other_clients > 0 {
         format!(
             "Users share the workers evenly by computing time, and {} other user{} running jobs.",
@@ -226,11 +226,15 @@ fn speed(reason: PaceReason, facts: &JobFacts) -> String {
         format!("; the evaluation under way needs about {:.1} s more", time.as_secs_f64())
     });
     let rate = if facts.rate > 0.0 {
-        format!(", {:.0} realizations per second{left}", facts.rate)
+        format!("{:.0} realizations per second{left}", facts.rate)
     } else {
-        ", and nothing has been answered lately".to_owned()
+        "nothing has been answered lately".to_owned()
     };
-    format!("It runs on {:.0} of {} slots{rate}.", facts.slots_used, facts.slots)
+    match facts.standing {
+        // Its slots are free for a moment.
+        Standing::Storing => format!("An evaluation is being stored; {rate}."),
+        _ => format!("It runs on {:.0} of {} slots: {rate}.", facts.slots_used, facts.slots),
+    }
 }
 
 fn jobs(count: u64) -> String {

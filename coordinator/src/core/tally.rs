@@ -1,4 +1,4 @@
-//! Counts what happens in a coordinator, from its events and effects: the reactions themselves count
+//! EventCounts what happens in a coordinator, from its events and effects: the reactions themselves count
 //! nothing. The numbers are for monitoring and influence nothing.
 
 use std::collections::BTreeMap;
@@ -15,9 +15,9 @@ use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::notice::Notice;
 use crate::core::state::State;
 
-/// Counts since the start of the process.
+/// EventCounts since the start of the process.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Counts {
+pub(crate) struct EventCounts {
     pub(crate) jobs_accepted: u64,
     /// In the order of [`Status::ALL`].
     pub(crate) jobs_ended: [u64; Status::ALL.len()],
@@ -60,10 +60,10 @@ fn purpose(purpose: Purpose) -> usize {
     }
 }
 
-/// Counts, and what is needed to continue counting.
+/// EventCounts, and what is needed to continue counting.
 #[derive(Debug, Default)]
 pub(crate) struct Tally {
-    counts: Counts,
+    counts: EventCounts,
     /// Time since which each job that has started waits for its next durable evaluation.
     evaluating: BTreeMap<JobId, Duration>,
 }
@@ -77,11 +77,11 @@ pub(crate) struct Before {
 }
 
 impl Tally {
-    pub(crate) fn counts(&self) -> &Counts {
+    pub(crate) fn counts(&self) -> &EventCounts {
         &self.counts
     }
 
-    /// Counts an event before the state reacts to it.
+    /// EventCounts an event before the state reacts to it.
     pub(crate) fn before(&mut self, state: &State, event: &Event, now: Duration) -> Before {
         let mut disputes = None;
         match event {
@@ -105,7 +105,7 @@ impl Tally {
         Before { disputes, bans: state.banned.len() }
     }
 
-    /// Counts what a reaction has changed, and its effects.
+    /// EventCounts what a reaction has changed, and its effects.
     pub(crate) fn after(
         &mut self,
         before: &Before,
@@ -121,7 +121,7 @@ impl Tally {
         self.effects(state, effects, now);
     }
 
-    /// Counts effects.
+    /// EventCounts effects.
     pub(crate) fn effects(&mut self, state: &State, effects: &[Effect], now: Duration) {
         for effect in effects {
             match effect {
@@ -163,7 +163,7 @@ impl Tally {
         }
     }
 
-    /// Counts the realizations of an answer if they fill an evaluation: those of duplicates, audits
+    /// EventCounts the realizations of an answer if they fill an evaluation: those of duplicates, audits
     /// and late answers are only compared.
     fn fill(&mut self, state: &State, worker: WorkerId, id: BatchId, solved: &[RealizationResult]) {
         let held = state.batches.get(&id).filter(|batch| batch.worker == worker);

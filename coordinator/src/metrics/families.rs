@@ -8,12 +8,12 @@ use osteon_common::version;
 use super::process::ProcessUsage;
 use crate::core::distribution::TimeDistribution;
 use crate::core::measurements::Measurements;
-use crate::core::tally::{Counts, PURPOSES};
+use crate::core::tally::{EventCounts, PURPOSES};
 
 /// Everything that a scrape shows.
 #[derive(Debug, Default)]
 pub(crate) struct Scrape {
-    pub(crate) counts: Counts,
+    pub(crate) counts: EventCounts,
     pub(crate) state: Measurements,
     /// Times for which the core reacted to events.
     pub(crate) event_times: TimeDistribution,
@@ -126,7 +126,7 @@ fn of_state(state: &Measurements) -> Vec<MetricFamily> {
 }
 
 /// Counters of jobs, evaluations, realizations and batches.
-fn of_work(counts: &Counts) -> Vec<MetricFamily> {
+fn of_work(counts: &EventCounts) -> Vec<MetricFamily> {
     let ended = Status::ALL.map(Status::name).into_iter().zip(counts.jobs_ended);
     let outcomes = ["ok"].into_iter().chain(FailureKind::ALL.map(FailureKind::name));
     let outcomes = outcomes.zip(counts.realizations);
@@ -162,7 +162,7 @@ fn of_work(counts: &Counts) -> Vec<MetricFamily> {
 }
 
 /// Counters of workers.
-fn of_workers(counts: &Counts) -> Vec<MetricFamily> {
+fn of_workers(counts: &EventCounts) -> Vec<MetricFamily> {
     vec![
         counter("osteon_workers_attached", "Workers that attached", counts.workers_attached),
         counter("osteon_workers_refused", "Workers that were refused", counts.workers_refused),

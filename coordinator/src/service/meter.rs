@@ -8,9 +8,9 @@ use crate::core::effect::Effect;
 use crate::core::event::Event;
 use crate::core::measurements::Measurements;
 use crate::core::state::State;
-use crate::core::tally::{Before, Counts, Tally};
+use crate::core::tally::{Before, EventCounts, Tally};
 
-/// Counts and times so far.
+/// EventCounts and times so far.
 #[derive(Debug, Default)]
 pub(crate) struct Meter {
     tally: Tally,
@@ -27,7 +27,7 @@ pub(crate) struct Reading {
 /// What the core task tells of itself.
 #[derive(Debug)]
 pub(crate) struct CoreReport {
-    pub(crate) counts: Counts,
+    pub(crate) counts: EventCounts,
     pub(crate) event_times: TimeDistribution,
     pub(crate) state: Measurements,
     /// Commands that wait for the store's thread.
@@ -35,12 +35,12 @@ pub(crate) struct CoreReport {
 }
 
 impl Meter {
-    /// Counts an event to which the state is about to react.
+    /// EventCounts an event to which the state is about to react.
     pub(crate) fn begin(&mut self, state: &State, event: &Event, now: Duration) -> Reading {
         Reading { begun: Instant::now(), before: self.tally.before(state, event, now) }
     }
 
-    /// Counts the effects of the reaction.
+    /// EventCounts the effects of the reaction.
     pub(crate) fn reacted(
         &mut self,
         reading: &Reading,
@@ -56,7 +56,7 @@ impl Meter {
         self.event_times.add(reading.begun.elapsed());
     }
 
-    /// Counts the effects of the coordinator's start.
+    /// EventCounts the effects of the coordinator's start.
     pub(crate) fn started(&mut self, state: &State, effects: &[Effect], now: Duration) {
         self.tally.effects(state, effects, now);
     }

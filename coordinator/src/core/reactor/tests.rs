@@ -12,7 +12,7 @@ use osteon_common::version;
 
 use super::*;
 use crate::config::Config;
-use crate::core::effect::{Answer, Effect, Record, RecordKey};
+use crate::core::effect::{Answer, Effect, Record, RecordKey, Refusal};
 
 use crate::core::event::{Hello, Request};
 use crate::core::ids::{BatchId, JobId, ReplyId, WorkerId};
@@ -20,6 +20,7 @@ use crate::core::sanity::sanity_check;
 
 mod checks;
 mod dispatch;
+mod explain;
 mod fairness;
 mod jobs;
 mod lost;

@@ -1,10 +1,10 @@
-//! Counts and measurements of what happens, as they are exported for monitoring.
+//! EventCounts and measurements of what happens, as they are exported for monitoring.
 
 use osteon_common::outcome::FailureKind;
 
 use super::*;
 use crate::core::measurements::Measurements;
-use crate::core::tally::{Counts, Tally};
+use crate::core::tally::{EventCounts, Tally};
 
 /// A rig whose events are counted.
 struct Counted {
@@ -30,7 +30,7 @@ impl Counted {
         self.event(stored(job, RecordKey::Job));
     }
 
-    fn counts(&self) -> &Counts {
+    fn counts(&self) -> &EventCounts {
         self.tally.counts()
     }
 
