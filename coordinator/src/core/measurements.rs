@@ -19,7 +19,7 @@ const USUAL_S: f64 = 1e-3;
 
 /// A state at one moment, in numbers.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Measurements {
+pub(crate) struct StateMeasurements {
     pub(crate) jobs_waiting: u64,
     pub(crate) jobs_running: u64,
     pub(crate) jobs_ended: u64,
@@ -43,7 +43,7 @@ pub(crate) struct Measurements {
     pub(crate) store_refusing: Duration,
 }
 
-impl Measurements {
+impl StateMeasurements {
     /// Measures a state.
     pub(crate) fn new(state: &State, now: Duration) -> Self {
         let since =

@@ -7,14 +7,14 @@ use osteon_common::version;
 
 use super::process::ProcessUsage;
 use crate::core::distribution::TimeDistribution;
-use crate::core::measurements::Measurements;
+use crate::core::measurements::StateMeasurements;
 use crate::core::tally::{EventCounts, PURPOSES};
 
 /// Everything that a scrape shows.
 #[derive(Debug, Default)]
 pub(crate) struct Scrape {
     pub(crate) counts: EventCounts,
-    pub(crate) state: Measurements,
+    pub(crate) state: StateMeasurements,
     /// Times for which the core reacted to events.
     pub(crate) event_times: TimeDistribution,
     pub(crate) write_times: TimeDistribution,
@@ -59,7 +59,7 @@ pub(crate) fn families(scrape: &Scrape) -> Vec<MetricFamily> {
 }
 
 /// Gauges of jobs, slots and workers.
-fn of_state(state: &Measurements) -> Vec<MetricFamily> {
+fn of_state(state: &StateMeasurements) -> Vec<MetricFamily> {
     vec![
         gauges(
             "osteon_jobs",

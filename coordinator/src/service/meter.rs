@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::core::distribution::TimeDistribution;
 use crate::core::effect::Effect;
 use crate::core::event::Event;
-use crate::core::measurements::Measurements;
+use crate::core::measurements::StateMeasurements;
 use crate::core::state::State;
 use crate::core::tally::{Before, EventCounts, Tally};
 
@@ -29,7 +29,7 @@ pub(crate) struct Reading {
 pub(crate) struct CoreReport {
     pub(crate) counts: EventCounts,
     pub(crate) event_times: TimeDistribution,
-    pub(crate) state: Measurements,
+    pub(crate) state: StateMeasurements,
     /// Commands that wait for the store's thread.
     pub(crate) store_queue: usize,
 }
@@ -66,7 +66,7 @@ impl Meter {
         CoreReport {
             counts: self.tally.counts().clone(),
             event_times: self.event_times.clone(),
-            state: Measurements::new(state, now),
+            state: StateMeasurements::new(state, now),
             store_queue,
         }
     }

@@ -3,7 +3,7 @@
 use osteon_common::outcome::FailureKind;
 
 use super::*;
-use crate::core::measurements::Measurements;
+use crate::core::measurements::StateMeasurements;
 use crate::core::tally::{EventCounts, Tally};
 
 /// A rig whose events are counted.
@@ -34,8 +34,8 @@ impl Counted {
         self.tally.counts()
     }
 
-    fn measured(&self) -> Measurements {
-        Measurements::new(&self.rig.state, self.rig.now)
+    fn measured(&self) -> StateMeasurements {
+        StateMeasurements::new(&self.rig.state, self.rig.now)
     }
 }
 
@@ -71,7 +71,8 @@ fn a_job_is_counted_from_its_acceptance_to_its_end() {
     assert_eq!(counts.jobs_ended.iter().sum::<u64>(), 1);
     assert_eq!(counts.batches_sent, [1, 0, 0, 0, 0]);
     let measured = counted.measured();
-    let expected = Measurements { jobs_ended: 1, slots_idle: 2, workers_ok: 1, ..measured.clone() };
+    let expected =
+        StateMeasurements { jobs_ended: 1, slots_idle: 2, workers_ok: 1, ..measured.clone() };
     assert_eq!(measured, expected);
     assert_eq!((measured.jobs_running, measured.slots_busy, measured.slots_wanted), (0, 0, 0));
 }
@@ -155,7 +156,7 @@ fn wanted_slots_are_those_that_are_worth_their_batches() {
         if let Some(each_s) = each_s {
             rig.state.jobs.get_mut(&job).unwrap().pace.learn(1, 1, each_s);
         }
-        let measured = Measurements::new(&rig.state, rig.now);
+        let measured = StateMeasurements::new(&rig.state, rig.now);
         assert_eq!(measured.slots_wanted, expected, "{realizations} of {each_s:?}");
     }
 }
