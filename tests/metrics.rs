@@ -33,14 +33,14 @@ fn keep(name: &str, text: &str) {
 }
 
 /// A coordinator with metrics on a port of its own.
-struct Measured {
+struct MeteredCoordinator {
     scratch: Scratch,
     process: Owned,
     url: String,
     metrics: String,
 }
 
-impl Measured {
+impl MeteredCoordinator {
     fn start() -> Self {
         let scratch = Scratch::new();
         let mut command = osteon();
@@ -144,7 +144,7 @@ fn is_exported(name: &str, all: &Described) -> bool {
 
 #[test]
 fn every_metric_of_a_run_is_documented_and_every_documented_one_is_exported() {
-    let measured = Measured::start();
+    let measured = MeteredCoordinator::start();
     let file = measured.scratch.write("job.toml", &job(100, 4));
     let client = |arguments: &[&str]| run(&[arguments, &["--coordinator", &measured.url]].concat());
     let id = client(&["submit", text(&file), "--name", "left-tibia", "--json"]).json();
@@ -245,7 +245,7 @@ fn every_alert_has_a_test() {
 
 #[test]
 fn the_listener_answers_one_path_and_outlives_bad_clients() {
-    let mut measured = Measured::start();
+    let mut measured = MeteredCoordinator::start();
     for (request, status) in [
         ("GET / HTTP/1.1\r\nhost: a\r\n\r\n", "404"),
         ("GET /metrics/x HTTP/1.1\r\nhost: a\r\n\r\n", "404"),

@@ -62,7 +62,7 @@ fn purpose(purpose: Purpose) -> usize {
 
 /// EventCounts, and what is needed to continue counting.
 #[derive(Debug, Default)]
-pub(crate) struct Tally {
+pub(crate) struct EventTally {
     counts: EventCounts,
     /// Time since which each job that has started waits for its next durable evaluation.
     evaluating: BTreeMap<JobId, Duration>,
@@ -76,7 +76,7 @@ pub(crate) struct Before {
     bans: usize,
 }
 
-impl Tally {
+impl EventTally {
     pub(crate) fn counts(&self) -> &EventCounts {
         &self.counts
     }

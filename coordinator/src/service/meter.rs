@@ -8,12 +8,12 @@ use crate::core::effect::Effect;
 use crate::core::event::Event;
 use crate::core::measurements::StateMeasurements;
 use crate::core::state::State;
-use crate::core::tally::{Before, EventCounts, Tally};
+use crate::core::tally::{Before, EventCounts, EventTally};
 
 /// EventCounts and times so far.
 #[derive(Debug, Default)]
 pub(crate) struct Meter {
-    tally: Tally,
+    tally: EventTally,
     event_times: TimeDistribution,
 }
 

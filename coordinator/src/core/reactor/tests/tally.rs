@@ -4,17 +4,17 @@ use osteon_common::outcome::FailureKind;
 
 use super::*;
 use crate::core::measurements::StateMeasurements;
-use crate::core::tally::{EventCounts, Tally};
+use crate::core::tally::{EventCounts, EventTally};
 
 /// A rig whose events are counted.
 struct Counted {
     rig: Rig,
-    tally: Tally,
+    tally: EventTally,
 }
 
 impl Counted {
     fn new(rig: Rig) -> Self {
-        Self { rig, tally: Tally::default() }
+        Self { rig, tally: EventTally::default() }
     }
 
     fn event(&mut self, event: Event) {
