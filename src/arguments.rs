@@ -3,6 +3,7 @@
 mod check;
 mod operators;
 mod realizations;
+mod services;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -15,6 +16,7 @@ use crate::program;
 pub(crate) use check::CheckArguments;
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
+pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
@@ -59,6 +61,8 @@ pub(crate) enum Command {
     /// The maximum number of evaluations shown includes the evaluations for the derivatives at the
     /// best point, one for each free parameter.
     Watch(JobArguments),
+    /// Explain why a job is not faster, and what would make it faster
+    Explain(ExplainArguments),
     /// Cancel a job
     Cancel(JobArguments),
     /// Write the results of an ended job to a directory
@@ -128,79 +132,6 @@ pub(crate) struct SimulateArguments {
     /// Time step of the traces (seconds)
     #[arg(long, value_name = "S", default_value = "1e-8", value_parser = positive)]
     pub(crate) time_step: f64,
-}
-
-/// Arguments of `coordinator`.
-#[derive(Debug, Args)]
-pub(crate) struct CoordinatorArguments {
-    /// Address to listen on: HOST:PORT (port 0 selects a free port) or unix:PATH
-    #[arg(long, value_name = "ADDR")]
-    pub(crate) listen: String,
-    /// Directory of the store. The URL at which clients reach the coordinator is written to
-    /// DIR/address
-    #[arg(long, value_name = "DIR")]
-    pub(crate) store: PathBuf,
-    /// Serve on addresses other than loopback without TLS: anyone who can reach the address can use
-    /// the coordinator
-    #[arg(long, conflicts_with_all = ["tls_ca", "tls_cert", "tls_key", "tokens", "token_file"])]
-    pub(crate) insecure: bool,
-    /// Serve with TLS: certificates of the authorities that sign workers' certificates (PEM)
-    #[arg(long, value_name = "FILE", requires_all = ["tls_cert", "tls_key"])]
-    pub(crate) tls_ca: Option<PathBuf>,
-    /// The coordinator's certificate (PEM)
-    #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_key"])]
-    pub(crate) tls_cert: Option<PathBuf>,
-    /// Private key of the certificate (PEM)
-    #[arg(long, value_name = "FILE", requires_all = ["tls_ca", "tls_cert"])]
-    pub(crate) tls_key: Option<PathBuf>,
-    /// List of the tokens that clients may use, one line NAME ROLE HASH each (see `osteon token`).
-    /// On SIGHUP the coordinator reads the list and the certificates again
-    #[arg(long, value_name = "FILE")]
-    pub(crate) tokens: Option<PathBuf>,
-    /// File with an additional client token, which has the role admin
-    #[arg(long, value_name = "FILE")]
-    pub(crate) token_file: Option<PathBuf>,
-    /// Fraction (0 to 1) of the batches that a second worker also computes, to detect workers that
-    /// return wrong results
-    #[arg(long, value_name = "F", default_value_t = osteon_coordinator::config::AUDIT_FRACTION,
-          value_parser = fraction)]
-    pub(crate) audit_fraction: f64,
-    /// Do not compute in advance, on idle threads, points that a search may request next. Results
-    /// are the same either way
-    #[arg(long)]
-    pub(crate) no_speculation: bool,
-    /// Delete ended jobs (converged, failed or cancelled) after this long: number and unit, e.g. 90d
-    /// (s, min, h or d) [default: never]
-    #[arg(long, value_name = "AGE", value_parser = age)]
-    pub(crate) keep_ended: Option<Duration>,
-    /// Start even if the store has lost accepted jobs; without this option the coordinator refuses
-    /// to start
-    #[arg(long)]
-    pub(crate) accept_lost_jobs: bool,
-    /// Time without a message after which a worker's batches are reassigned (seconds, 1 to 3600).
-    /// Heartbeats are sent five times per lease
-    #[arg(long, value_name = "S", default_value = "10", value_parser = lease)]
-    pub(crate) lease: Duration,
-}
-
-/// Arguments of `worker`.
-#[derive(Debug, Args)]
-pub(crate) struct WorkerArguments {
-    /// The coordinator: https://HOST:PORT, http://HOST:PORT or unix:PATH [env: OSTEON_COORDINATOR]
-    #[arg(long, value_name = "URL")]
-    pub(crate) coordinator: Option<Endpoint>,
-    /// Credentials for the coordinator.
-    #[command(flatten)]
-    pub(crate) credentials: CredentialArguments,
-    /// Number of threads to compute on [default: all cores]
-    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
-    pub(crate) threads: Option<u32>,
-    /// Exit if no coordinator can be reached for this many seconds [default: never]
-    #[arg(long, value_name = "S", value_parser = seconds)]
-    pub(crate) give_up_after: Option<f64>,
-    /// Finish the current work and exit after this many seconds [default: never]
-    #[arg(long, value_name = "S", value_parser = seconds)]
-    pub(crate) time_limit: Option<f64>,
 }
 
 /// Credentials for a coordinator, and the authorities that certify it.
@@ -324,6 +255,20 @@ pub(crate) struct JobArguments {
     pub(crate) client: ClientArguments,
 }
 
+/// Arguments of `explain`.
+#[derive(Debug, Args)]
+pub(crate) struct ExplainArguments {
+    /// Id of the job
+    #[arg(value_name = "ID")]
+    pub(crate) job: String,
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
+    /// Print the output as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// Arguments of `fetch`.
 #[derive(Debug, Args)]
 pub(crate) struct FetchArguments {
@@ -411,20 +356,6 @@ fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number <= SECONDS_MAX => Ok(number),
         _ => Err(format!("it must be a number above 0 and at most {SECONDS_MAX} (s)")),
-    }
-}
-
-fn lease(text: &str) -> Result<Duration, String> {
-    match text.parse::<f64>() {
-        Ok(number) if (1.0..=3600.0).contains(&number) => Ok(Duration::from_secs_f64(number)),
-        _ => Err("it must be a number from 1 to 3600 (s)".to_owned()),
-    }
-}
-
-fn fraction(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if (0.0..=1.0).contains(&number) => Ok(number),
-        _ => Err("it must be a number from 0 to 1".to_owned()),
     }
 }
 

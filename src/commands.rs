@@ -40,7 +40,9 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
             unless_interrupted(observe::observe(arguments, isa, threads), left).await
         }
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
-        Resolved::Worker { config, files, unused } => worker::serve(config, &files, &unused).await,
+        Resolved::Worker { config, files, unused, .. } => {
+            worker::serve(config, &files, &unused).await
+        }
         Resolved::Certs(arguments) => certs::make(&arguments),
         Resolved::Token(arguments) => token::make(&arguments),
         Resolved::Schema(arguments) => schema::print(&arguments),
@@ -60,6 +62,9 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
         Resolved::Watch { job, coordinator } => {
             let left = "the job continues (see `osteon jobs`, `osteon cancel`)";
             unless_interrupted(jobs::watch(&job, &coordinator), left).await
+        }
+        Resolved::Explain { job, coordinator, format } => {
+            unless_interrupted(jobs::explain(&job, &coordinator, format), NOTHING_LEFT).await
         }
         Resolved::Cancel { job, coordinator } => {
             let left = "the job may have been cancelled (see `osteon jobs`)";

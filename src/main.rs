@@ -16,6 +16,7 @@ mod fuzz;
 mod job_point;
 mod listener_security;
 mod log_filter;
+mod logging;
 mod new_files;
 mod observations;
 mod output;
@@ -33,33 +34,32 @@ mod simulation_directory;
 mod unsearched_groups;
 mod warnings;
 
-use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::Parser as _;
-use osteon_common::visible;
 
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, LogFormat};
 use crate::exit_status::{CommandFailure, ExitStatus};
 use crate::resolved::Resolved;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    match run(arguments) {
+    // Before the log is set up, failures are reported as text.
+    let mut log_format = LogFormat::Text;
+    match run(arguments, &mut log_format) {
         Ok(ExitStatus::Done) | Err(CommandFailure::ClosedPipe) => ExitCode::SUCCESS,
         Ok(ExitStatus::RunFailed) => ExitCode::from(1),
         Err(failure) => {
-            // If stderr is closed as well, nothing more can be done.
-            let message = failure.to_string();
-            let _closed = writeln!(std::io::stderr(), "osteon: {}", visible::lines(&message));
+            logging::report(&failure, log_format);
             ExitCode::from(failure.exit_code())
         }
     }
 }
 
-fn run(arguments: Arguments) -> Result<ExitStatus, CommandFailure> {
+fn run(arguments: Arguments, log_format: &mut LogFormat) -> Result<ExitStatus, CommandFailure> {
     let resolved = Resolved::from_arguments(arguments)?;
-    trace(resolved.default_log_level())?;
+    logging::start(resolved.default_log_level(), resolved.log_format())?;
+    *log_format = resolved.log_format();
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
@@ -71,19 +71,4 @@ fn run(arguments: Arguments) -> Result<ExitStatus, CommandFailure> {
     // An abandoned computation may still occupy a thread; its result is not needed.
     runtime.shutdown_background();
     result
-}
-
-/// Sends logs to stderr; `RUST_LOG` overrides the level.
-///
-/// # Errors
-/// If `RUST_LOG` is not a valid filter.
-fn trace(default_level: &str) -> Result<(), CommandFailure> {
-    let filter = log_filter::read(std::env::var_os(log_filter::VARIABLE), default_level)?;
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(progress::LogWriter)
-        .with_ansi(false)
-        .with_target(false)
-        .init();
-    Ok(())
 }

@@ -12,7 +12,9 @@ use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
 use osteon_common::sampling::NominalSampling;
 use osteon_files::report::{ResultFile, Solver};
-use osteon_proto::v1::{BackupEnd, BannedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot};
+use osteon_proto::v1::{
+    BackupEnd, BannedWorker, ExplainResponse, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
+};
 use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Failure, FirstSignal, GuidedWaves, Isa};
 
@@ -107,6 +109,8 @@ pub(crate) trait Output {
     fn health(&mut self, not_serving: Option<&str>) -> io::Result<()>;
     /// Prints the file of a copy of a store.
     fn backup(&mut self, file: &Path, copy: &BackupEnd) -> io::Result<()>;
+    /// Prints what decides how fast a job is.
+    fn explanation(&mut self, explained: &ExplainResponse) -> io::Result<()>;
     /// Prints the ids of the deleted jobs.
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()>;
     /// Prints the current state of one job.

@@ -90,11 +90,12 @@ fn secrets(scratch: &Scratch) -> Vec<String> {
 
 /// The roles that may call each method of the services, and whether a certificate is sufficient.
 /// Methods that are not listed here, including new ones, may be called by admins only.
-const CALLERS: [(&str, &[&str], bool); 12] = [
+const CALLERS: [(&str, &[&str], bool); 13] = [
     ("/grpc.health.v1.Health/", &["none", "stranger", "read", "submit", "admin"], true),
     ("/grpc.reflection.v1.ServerReflection/", &["read", "submit", "admin"], true),
     ("/grpc.reflection.v1alpha.ServerReflection/", &["read", "submit", "admin"], true),
     ("/osteon.v1.Jobs/Get", &["read", "submit", "admin"], false),
+    ("/osteon.v1.Jobs/Explain", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/List", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/ListBans", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/ListWorkers", &["read", "submit", "admin"], false),

@@ -143,9 +143,10 @@ pub fn need(path: &str) -> Requirement {
     match (service, method) {
         ("grpc.health.v1.Health", _) => Requirement::Nothing,
         ("osteon.v1.Workers", _) => Requirement::Worker,
-        ("osteon.v1.Jobs", "Get" | "List" | "ListBans" | "ListWorkers" | "Watch" | "Fetch") => {
-            Requirement::Role(Role::Read)
-        }
+        (
+            "osteon.v1.Jobs",
+            "Get" | "Explain" | "List" | "ListBans" | "ListWorkers" | "Watch" | "Fetch",
+        ) => Requirement::Role(Role::Read),
         ("osteon.v1.Jobs", "Submit" | "Cancel") => Requirement::Role(Role::Submit),
         ("osteon.v1.Jobs", _) => Requirement::Role(Role::Admin),
         // Reflection, and services that do not exist.

@@ -2,12 +2,13 @@
 //!
 //! The coordinator consists of a pure state machine ([`core`]) and an asynchronous shell around it
 //! ([`service`]) that only moves bytes. [`access`] decides who may call what; [`store`] holds
-//! everything that outlives the process. An [`osteon_search::Search`] decides which points a job
+//! everything that outlives the process; `metrics` says what is exported for monitoring. An [`osteon_search::Search`] decides which points a job
 //! evaluates and does not depend on workers. This crate never links the solver: only workers solve.
 
 pub mod access;
 pub mod config;
 pub mod core;
+pub(crate) mod metrics;
 pub mod service;
 pub mod store;
 
@@ -17,4 +18,5 @@ pub use access::tokens::Tokens;
 pub use config::Config;
 pub use service::failing::ComponentFailure;
 pub use service::listen::{BindError, ListenAddress, Listener};
+pub use service::metrics_listener::{MetricsBindError, MetricsListener};
 pub use service::shell::{Coordinator, StartError, start};

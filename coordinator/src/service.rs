@@ -8,6 +8,8 @@ pub(crate) mod failing;
 pub(crate) mod fetching;
 pub(crate) mod jobs;
 pub mod listen;
+pub(crate) mod meter;
+pub mod metrics_listener;
 pub(crate) mod observers;
 pub mod open_files;
 pub(crate) mod outbound;

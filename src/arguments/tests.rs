@@ -1,5 +1,6 @@
 use clap::CommandFactory as _;
 
+use super::services::lease;
 use super::*;
 
 #[test]

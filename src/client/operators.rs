@@ -1,4 +1,4 @@
-//! Requests of operators: workers, health, and a copy of the store.
+//! Requests of operators: workers, what delays a job, health, and a copy of the store.
 
 use std::time::Duration;
 
@@ -6,7 +6,7 @@ use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::endpoint;
 use osteon_proto::malformed::Malformed;
 use osteon_proto::v1::backup_response::Part;
-use osteon_proto::v1::{self, BackupEnd, ListWorkersResponse, WorkerSnapshot};
+use osteon_proto::v1::{self, BackupEnd, ExplainResponse, ListWorkersResponse, WorkerSnapshot};
 use tokio::time::{Instant, timeout};
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
@@ -19,6 +19,12 @@ impl Client {
     /// Returns the attached workers, and those that left last.
     pub(crate) async fn workers(&mut self) -> Result<ListWorkersResponse, ClientError> {
         let call = self.jobs.list_workers(v1::ListWorkersRequest {});
+        self.peer.answered(call).await
+    }
+
+    /// Returns what decides how fast a job is.
+    pub(crate) async fn explain(&mut self, job: &str) -> Result<ExplainResponse, ClientError> {
+        let call = self.jobs.explain(v1::ExplainRequest { job: job.to_owned() });
         self.peer.answered(call).await
     }
 

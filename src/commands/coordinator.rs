@@ -1,13 +1,14 @@
 //! `coordinator`: serves jobs to clients and workers until it is asked to end.
 
 use std::fs;
+use std::path::{Path, PathBuf};
 use std::pin::pin;
 
 use anyhow::Context as _;
 use osteon_common::visible;
 use osteon_coordinator::service::open_files;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
-use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress};
+use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress, MetricsListener};
 
 use crate::arguments::CoordinatorArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
@@ -22,7 +23,7 @@ use crate::signals;
 const HEARTBEATS_PER_LEASE: u32 = 5;
 
 /// Serves until SIGINT or SIGTERM, or until a part of it has ended unexpectedly. The URL in use is
-/// printed, and stands in DIR/address.
+/// printed, and stands in DIR/address; that of the metrics stands in DIR/metrics-address.
 pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus, CommandFailure> {
     let address: ListenAddress = arguments.listen.parse().map_err(CommandFailure::bad_input)?;
     // Read before anything is bound or created.
@@ -42,6 +43,13 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
     }
     open_files::raise_limit();
     let listener = security.bind(&address, arguments.insecure).await.map_err(bind_failure)?;
+    let listener = match arguments.metrics {
+        None => listener,
+        Some(address) => {
+            let metrics = MetricsListener::bind(address).await.map_err(CommandFailure::failed)?;
+            listener.with_metrics(metrics)
+        }
+    };
     let lost = if arguments.accept_lost_jobs { LostJobs::Accept } else { LostJobs::Refuse };
     let store = SqliteStore::open_with(&directory, lost).map_err(CommandFailure::failed)?;
     let config = Config {
@@ -56,9 +64,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
     let coordinator = osteon_coordinator::start(listener, Box::new(store), config)
         .await
         .map_err(CommandFailure::failed)?;
-    let address_file = directory.join("address");
-    result_files::write(&address_file, &format!("{}\n", coordinator.url()))
-        .map_err(CommandFailure::Failed)?;
+    let address_files = write_addresses(&directory, &coordinator)?;
     let printed = output::stdout(OutputFormat::Text).verbatim(&format!("{}\n", coordinator.url()));
     let served = match printed {
         Ok(()) => loop {
@@ -71,10 +77,27 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
         Err(error) => Err(stdout_failure(error)),
     };
     tracing::info!("stopping");
-    drop(fs::remove_file(&address_file));
+    for file in address_files {
+        drop(fs::remove_file(file));
+    }
     coordinator.shutdown().await;
     tracing::info!("stopped");
     served
+}
+
+/// Writes the URL of a coordinator, and that of its metrics, to files in its directory.
+fn write_addresses(
+    directory: &Path,
+    coordinator: &Coordinator,
+) -> Result<Vec<PathBuf>, CommandFailure> {
+    let urls =
+        [("address", Some(coordinator.url())), ("metrics-address", coordinator.metrics_url())];
+    let urls = urls.into_iter().filter_map(|(name, url)| Some((directory.join(name), url?)));
+    let written = urls.map(|(file, url)| {
+        result_files::write(&file, &format!("{url}\n")).map_err(CommandFailure::Failed)?;
+        Ok(file)
+    });
+    written.collect()
 }
 
 /// Reloads tokens and certificates; if any of them cannot be used, all stay as they are.

@@ -1,4 +1,4 @@
-//! `submit`, `jobs`, `watch`, `cancel`, `fetch`: requests to a running coordinator.
+//! `submit`, `jobs`, `watch`, `explain`, `cancel`, `fetch`: requests to a running coordinator.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -91,6 +91,17 @@ pub(super) async fn watch(job: &str, coordinator: &Remote) -> Result<ExitStatus,
     };
     let last = client.watch(job, show).await?;
     Ok(exit_status(&last))
+}
+
+/// `explain`: prints what decides how fast a job is.
+pub(super) async fn explain(
+    job: &str,
+    coordinator: &Remote,
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
+    let explained = Client::connect(coordinator).await?.explain(job).await?;
+    output::stdout(format).explanation(&explained).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
 }
 
 /// `cancel`: prints the job's state afterwards.

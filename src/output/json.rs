@@ -12,7 +12,8 @@ use osteon_files::report::{
 };
 use osteon_proto::timestamp;
 use osteon_proto::v1::{
-    BackupEnd, BannedWorker, DepartedWorker, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
+    BackupEnd, BannedWorker, DepartedWorker, ExplainResponse, JobSnapshot, ListWorkersResponse,
+    WorkerSnapshot,
 };
 use osteon_solver::check::{Difference, MethodSolution};
 use osteon_solver::{FirstSignal, GuidedWave, GuidedWaves};
@@ -95,6 +96,10 @@ impl Output for JsonOutput<'_> {
 
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
         self.value(&json!({ "pruned": jobs }))
+    }
+
+    fn explanation(&mut self, explained: &ExplainResponse) -> io::Result<()> {
+        self.value(&explanation_value(explained))
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
@@ -209,6 +214,24 @@ fn departed_value(worker: &DepartedWorker) -> Value {
         "departed": departed.and_then(utc),
         "reason": worker.reason,
         "batches": worker.batches,
+    })
+}
+
+fn explanation_value(explained: &ExplainResponse) -> Value {
+    // The names are those of the messages, without the prefix of the type and in lower case.
+    let reason = explained.reason().as_str_name().trim_start_matches("PACE_REASON_");
+    json!({
+        "job": explained.job,
+        "reason": reason.to_ascii_lowercase(),
+        "text": explained.text,
+        "slots": explained.slots,
+        "slots_used": explained.slots_used,
+        "realizations": explained.realizations,
+        "realizations_left": explained.realizations_left,
+        "realizations_per_second": explained.realizations_per_second,
+        "expected_s": explained.expected_s,
+        "waiting_s": explained.waiting_s,
+        "worker": explained.worker,
     })
 }
 

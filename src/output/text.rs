@@ -20,7 +20,8 @@ use std::path::Path;
 
 use osteon_common::visible;
 use osteon_proto::v1::{
-    BackupEnd, BannedWorker, JobKind, JobSnapshot, JobState, ListWorkersResponse, WorkerSnapshot,
+    BackupEnd, BannedWorker, ExplainResponse, JobKind, JobSnapshot, JobState, ListWorkersResponse,
+    WorkerSnapshot,
 };
 
 use self::layout::{WIDTH, aligned, glued, wrapped};
@@ -97,6 +98,10 @@ impl Output for TextOutput<'_> {
     fn pruned(&mut self, jobs: &[String]) -> io::Result<()> {
         let line = |job: &String| format!("{}\n", visible::line(job));
         self.verbatim(&jobs.iter().map(line).collect::<String>())
+    }
+
+    fn explanation(&mut self, explained: &ExplainResponse) -> io::Result<()> {
+        self.verbatim(&wrapped(&explained.text))
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {

@@ -225,7 +225,7 @@ impl Worker {
             if !was_attached && self.state.is_attached() {
                 backoff.reset();
                 self.ever_attached = true;
-                info!(endpoint = %self.endpoint, worker = self.state.number(), "attached");
+                info!(endpoint = %self.endpoint, worker = %self.state.number(), "attached");
             }
             if !self.state.is_attached() && Instant::now() > hello_deadline {
                 return Ok(End::Lost("the coordinator does not answer".to_owned()));

@@ -3,6 +3,7 @@
 mod chaos;
 mod deny;
 mod digests;
+mod metrics;
 mod python;
 mod random;
 mod reference;
@@ -68,9 +69,14 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(deny::check),
     ),
     (
+        "metrics",
+        "metrics, dashboard and alert rules: their tests, and promtool if there is one",
+        Action::Function(metrics::check),
+    ),
+    (
         "ci",
-        "what CI runs: lint, deny, every test, the client in Python",
-        Action::Commands(&["lint", "deny", "test", "python"]),
+        "what CI runs: lint, deny, every test, metrics, the client in Python",
+        Action::Commands(&["lint", "deny", "test", "metrics", "python"]),
     ),
     (
         "tables",

@@ -8,11 +8,12 @@ use tonic::{Code, Status};
 use super::*;
 
 /// Every method and its requirement.
-const NEEDS: [(&str, Requirement); 14] = [
+const NEEDS: [(&str, Requirement); 15] = [
     ("/grpc.health.v1.Health/Check", Requirement::Nothing),
     ("/osteon.v1.Jobs/Get", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/List", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/ListBans", Requirement::Role(Role::Read)),
+    ("/osteon.v1.Jobs/Explain", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/ListWorkers", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/Watch", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/Fetch", Requirement::Role(Role::Read)),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_proto::batch::Work;
-use osteon_proto::v1::{JobSnapshot, ListWorkersResponse, WorkerSnapshot};
+use osteon_proto::v1::{ExplainResponse, JobSnapshot, ListWorkersResponse, WorkerSnapshot};
 use osteon_search::Summary;
 use thiserror::Error;
 
@@ -183,6 +183,8 @@ pub enum Answer {
     Submitted(JobId),
     /// Snapshot of a job.
     Snapshot(JobSnapshot),
+    /// What decides how fast a job is.
+    Explained(ExplainResponse),
     /// A page of jobs.
     Page {
         /// Oldest first.

@@ -134,6 +134,8 @@ pub enum Request {
     },
     /// Get a snapshot of a job.
     Get(JobId),
+    /// Explain what decides how fast a job is.
+    Explain(JobId),
     /// List snapshots of the jobs after a given one, oldest first.
     List {
         /// Last job of the previous page.

@@ -28,15 +28,6 @@ pub(crate) fn worker_snapshot(
 fn snapshot(state: &State, id: WorkerId, worker: &AttachedWorker, now: Duration) -> WorkerSnapshot {
     let held = worker.in_flight.iter().filter_map(|batch| state.batches.get(batch));
     let oldest = held.map(|batch| batch.sent).min();
-    let worker_state = if worker.draining {
-        WorkerState::Draining
-    } else if state.is_failing(worker.name.host()) {
-        WorkerState::Distrusted
-    } else if state.probation.has(&worker.name) {
-        WorkerState::Probation
-    } else {
-        WorkerState::Ok
-    };
     WorkerSnapshot {
         worker: id.0,
         host: worker.name.host().to_owned(),
@@ -48,7 +39,20 @@ fn snapshot(state: &State, id: WorkerId, worker: &AttachedWorker, now: Duration)
         realizations_per_second: worker.rate.per_second(now),
         batches: u32::try_from(worker.in_flight.len()).unwrap_or(u32::MAX),
         oldest_batch_s: oldest.map(|sent| now.saturating_sub(sent).as_secs_f64()),
-        state: worker_state.into(),
+        state: worker_state(state, worker).into(),
+    }
+}
+
+/// Returns the state of an attached worker, never unspecified.
+pub(crate) fn worker_state(state: &State, worker: &AttachedWorker) -> WorkerState {
+    if worker.draining {
+        WorkerState::Draining
+    } else if state.is_failing(worker.name.host()) {
+        WorkerState::Distrusted
+    } else if state.probation.has(&worker.name) {
+        WorkerState::Probation
+    } else {
+        WorkerState::Ok
     }
 }
 

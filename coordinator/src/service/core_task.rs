@@ -16,6 +16,7 @@ use crate::core::reactor::react;
 use crate::core::snapshot;
 use crate::core::state::State;
 use crate::service::failing::{ComponentFailure, FailureReporter};
+use crate::service::meter::{CoreReport, Meter};
 use crate::service::outbound::{self, NotReading, Outbound};
 use crate::store::thread::StoreCommand;
 
@@ -29,6 +30,8 @@ pub(crate) enum Message {
     Watch(JobId, oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>),
     /// A worker's stream began; messages to it go to `outbound`.
     Attach { worker: WorkerId, hello: Hello, outbound: Outbound },
+    /// Metrics are to be exported.
+    Measure(oneshot::Sender<CoreReport>),
     /// Stop, and report when that is done.
     Shutdown(oneshot::Sender<()>),
 }
@@ -65,6 +68,8 @@ pub(crate) struct Core {
     on_stop: Option<oneshot::Sender<()>>,
     stopped: bool,
     failing: FailureReporter,
+    /// Present if metrics are exported.
+    meter: Option<Meter>,
     config: Config,
 }
 
@@ -75,6 +80,7 @@ impl Core {
         commands: mpsc::Sender<StoreCommand>,
         events: mpsc::Sender<Event>,
         failing: FailureReporter,
+        meter: Option<Meter>,
     ) -> Self {
         let config = state.config;
         Self {
@@ -89,6 +95,7 @@ impl Core {
             on_stop: None,
             stopped: false,
             failing,
+            meter,
             config,
         }
     }
@@ -101,6 +108,9 @@ impl Core {
         tick: Duration,
     ) {
         let mut followups = VecDeque::new();
+        if let Some(meter) = &mut self.meter {
+            meter.started(&self.state, &effects, self.clock.now());
+        }
         self.apply(effects, &mut followups);
         self.handle(followups);
         let mut ticks = tokio::time::interval(tick);
@@ -131,6 +141,7 @@ impl Core {
                 self.outbound.insert(worker, outbound);
                 self.handle(VecDeque::from([Event::Hello { worker, hello }]));
             }
+            Message::Measure(reply) => self.measure(reply),
             Message::Shutdown(reply) => {
                 self.on_stop = Some(reply);
                 self.handle(VecDeque::from([Event::Drain]));
@@ -145,8 +156,16 @@ impl Core {
             if let Event::StreamEnded { worker } = &event {
                 self.outbound.remove(worker);
             }
-            let effects = react(&mut self.state, event, self.clock.now());
+            let now = self.clock.now();
+            let reading = self.meter.as_mut().map(|meter| meter.begin(&self.state, &event, now));
+            let effects = react(&mut self.state, event, now);
+            if let Some((meter, reading)) = self.meter.as_mut().zip(reading.as_ref()) {
+                meter.reacted(reading, &self.state, &effects, now);
+            }
             self.apply(effects, &mut events);
+            if let Some((meter, reading)) = self.meter.as_mut().zip(reading) {
+                meter.end(&reading);
+            }
         }
     }
 
@@ -274,6 +293,14 @@ impl Core {
         }
         // The client may have gone.
         let _ = reply.send(answer);
+    }
+
+    fn measure(&self, reply: oneshot::Sender<CoreReport>) {
+        if let Some(meter) = &self.meter {
+            let queue = self.commands.max_capacity() - self.commands.capacity();
+            // Whoever asked may have gone.
+            let _ = reply.send(meter.report(&self.state, queue, self.clock.now()));
+        }
     }
 
     fn publish(&mut self, job: JobId, snapshot: v1::JobSnapshot) {

@@ -12,10 +12,10 @@ use osteon_proto::status::Resource;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
     BackupRequest, BackupResponse, BannedWorker, CancelRequest, CancelResponse, DrainWorkerRequest,
-    DrainWorkerResponse, FetchRequest, FetchResponse, GetRequest, GetResponse, JobSnapshot,
-    ListBansRequest, ListBansResponse, ListRequest, ListResponse, ListWorkersRequest,
-    ListWorkersResponse, PruneRequest, PruneResponse, SubmitRequest, SubmitResponse, WatchRequest,
-    WatchResponse,
+    DrainWorkerResponse, ExplainRequest, ExplainResponse, FetchRequest, FetchResponse, GetRequest,
+    GetResponse, JobSnapshot, ListBansRequest, ListBansResponse, ListRequest, ListResponse,
+    ListWorkersRequest, ListWorkersResponse, PruneRequest, PruneResponse, SubmitRequest,
+    SubmitResponse, WatchRequest, WatchResponse,
 };
 use osteon_proto::{specification, status};
 use tokio::sync::mpsc::error::SendTimeoutError;
@@ -153,6 +153,17 @@ impl Jobs for JobsService {
         let job = job(&request.into_inner().job)?;
         let snapshot = self.snapshot(event::Request::Get(job)).await?;
         Ok(Response::new(GetResponse { snapshot }))
+    }
+
+    async fn explain(
+        &self,
+        request: Request<ExplainRequest>,
+    ) -> Result<Response<ExplainResponse>, Status> {
+        let job = job(&request.into_inner().job)?;
+        match self.ask(event::Request::Explain(job)).await? {
+            Answer::Explained(explained) => Ok(Response::new(explained)),
+            _ => Err(unexpected()),
+        }
     }
 
     async fn list(&self, request: Request<ListRequest>) -> Result<Response<ListResponse>, Status> {

@@ -18,6 +18,7 @@ use crate::access::Policy;
 use crate::access::tls::Tls;
 use crate::access::tokens::Tokens;
 use crate::service::accept::BoundSocket;
+use crate::service::metrics_listener::MetricsListener;
 
 /// An address to listen on: `127.0.0.1:7000`, `[::1]:0`, `localhost:0` or `unix:PATH`. With port 0
 /// the system chooses a free port.
@@ -94,6 +95,8 @@ pub struct Listener {
     pub(crate) file: Option<SocketFile>,
     pub(crate) tls: Option<Tls>,
     pub(crate) policy: Policy,
+    /// Present if metrics are exported.
+    pub(crate) metrics: Option<MetricsListener>,
     url: String,
 }
 
@@ -142,13 +145,19 @@ impl Listener {
             _ => format!("https://{local}"),
         };
         let (bound, policy) = (BoundSocket::Tcp(listener), Policy::Tls(tokens));
-        Ok(Self { bound, file: None, tls: Some(tls), policy, url })
+        Ok(Self { bound, file: None, tls: Some(tls), policy, metrics: None, url })
     }
 
     /// Admits only holders of tokens.
     #[must_use]
     pub fn with_tokens(self, tokens: Tokens) -> Self {
         Self { policy: Policy::Tokens(tokens), ..self }
+    }
+
+    /// Exports metrics on an address of their own.
+    #[must_use]
+    pub fn with_metrics(self, metrics: MetricsListener) -> Self {
+        Self { metrics: Some(metrics), ..self }
     }
 
     /// Returns the URL that clients and workers use: `https://HOST:PORT`, `http://127.0.0.1:PORT`
@@ -184,7 +193,7 @@ impl Listener {
 
     /// Returns a listener that admits everybody.
     fn open(bound: BoundSocket, file: Option<SocketFile>, url: String) -> Self {
-        Self { bound, file, tls: None, policy: Policy::Everybody, url }
+        Self { bound, file, tls: None, policy: Policy::Everybody, metrics: None, url }
     }
 }
 

@@ -25,11 +25,14 @@ use crate::config::Config;
 use crate::core::audit::AuditKey;
 use crate::core::reactor::Restored;
 use crate::core::state::State;
+use crate::metrics::write_times::WriteTimes;
 use crate::service::accept;
 use crate::service::core_task::{Clock, Core, Message};
 use crate::service::failing::{ComponentFailure, FailureReporter, Guard};
 use crate::service::jobs::JobsService;
 use crate::service::listen::Listener;
+use crate::service::meter::Meter;
+use crate::service::metrics_listener::{self, MetricSources, MetricsListener};
 use crate::service::workers::WorkersService;
 use crate::store::thread::{self, StoreCommand};
 use crate::store::{Store, StoreError};
@@ -86,7 +89,29 @@ pub struct Coordinator {
     server: tokio::task::JoinHandle<()>,
     core: tokio::task::JoinHandle<()>,
     store: JoinHandle<()>,
+    metrics: Option<MetricsTask>,
     shutdown_timeout: Duration,
+}
+
+/// The task that serves metrics; it ends when this is dropped.
+#[derive(Debug)]
+struct MetricsTask {
+    url: String,
+    task: tokio::task::JoinHandle<()>,
+}
+
+impl MetricsTask {
+    fn start(listener: MetricsListener, sources: MetricSources) -> Self {
+        let url = listener.url().to_owned();
+        tracing::info!(%url, "metrics are exported");
+        Self { url, task: tokio::spawn(metrics_listener::serve(listener, sources)) }
+    }
+}
+
+impl Drop for MetricsTask {
+    fn drop(&mut self) {
+        self.task.abort();
+    }
 }
 
 /// Starts a coordinator on a bound address, and continues the jobs of its store.
@@ -94,7 +119,7 @@ pub struct Coordinator {
 /// # Errors
 /// When the store cannot be read, or another part cannot be started.
 pub async fn start(
-    listener: Listener,
+    mut listener: Listener,
     mut store: Box<dyn Store + Send>,
     config: Config,
 ) -> Result<Coordinator, StartError> {
@@ -115,9 +140,17 @@ pub async fn start(
     let failing = FailureReporter::new();
     let (messages, inbox) = mpsc::channel(EVENTS_MAX);
     let (events, from_store) = mpsc::channel(EVENTS_MAX);
-    let (commands, store) =
-        thread::start(store, events.clone(), failing.guard(ComponentFailure::Store))
-            .map_err(|source| StartError::Thread { source })?;
+    let write_times = WriteTimes::default();
+    let (commands, store) = thread::start(
+        store,
+        events.clone(),
+        write_times.clone(),
+        failing.guard(ComponentFailure::Store),
+    )
+    .map_err(|source| StartError::Thread { source })?;
+    let metrics = listener.metrics.take().map(|listener| {
+        MetricsTask::start(listener, MetricSources::new(messages.clone(), write_times))
+    });
     let (policy, decided) = watch::channel(Arc::new(listener.policy.clone()));
     let (tls, shown) = listener.tls.clone().map(watch::channel).unzip();
     let router = services(&messages, &commands, decided, config).await?;
@@ -126,7 +159,8 @@ pub async fn start(
     let server = serve(router, listener, shown, stopped);
     let server = tokio::spawn(guarded(failing.guard(ComponentFailure::Server), server));
     let guard = failing.guard(ComponentFailure::Core);
-    let core = Core::new(state, clock, commands, events, failing.clone());
+    let meter = metrics.is_some().then(Meter::default);
+    let core = Core::new(state, clock, commands, events, failing.clone(), meter);
     let core = core.run(effects, inbox, from_store, config.tick);
     let core = tokio::spawn(guarded(guard, core));
     tracing::info!(%url, "listening");
@@ -140,6 +174,7 @@ pub async fn start(
         server,
         core,
         store,
+        metrics,
         shutdown_timeout: config.shutdown_timeout,
     })
 }
@@ -149,6 +184,11 @@ impl Coordinator {
     /// or `unix:PATH`.
     pub fn url(&self) -> &str {
         &self.url
+    }
+
+    /// Returns the URL of the metrics, if they are exported.
+    pub fn metrics_url(&self) -> Option<&str> {
+        self.metrics.as_ref().map(|metrics| metrics.url.as_str())
     }
 
     /// Replaces the accepted tokens, for every call that begins from now on. A coordinator that
@@ -193,6 +233,7 @@ impl Coordinator {
         }
         self.core.abort();
         let _ = self.core.await;
+        drop(self.metrics);
         let _ = self.stop_serving.send(());
         let mut server = self.server;
         if tokio::time::timeout(self.shutdown_timeout, &mut server).await.is_err() {

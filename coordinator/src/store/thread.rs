@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use std::fs::File;
 use std::ops::ControlFlow;
 use std::thread::{self, JoinHandle};
+use std::time::Instant;
 
 use osteon_common::limits::JOBS_MAX;
 use tokio::sync::mpsc::error::TryRecvError;
@@ -14,6 +15,7 @@ use tokio::sync::{mpsc, oneshot};
 use crate::core::effect::Record;
 use crate::core::event::{Event, ReadFailure};
 use crate::core::ids::{JobId, ReplyId};
+use crate::metrics::write_times::WriteTimes;
 use crate::service::failing::Guard;
 use crate::store::group::Group;
 use crate::store::job_output::ReadRequest;
@@ -44,12 +46,13 @@ pub(crate) enum StoreCommand {
 pub(crate) fn start(
     mut store: Box<dyn Store + Send>,
     events: mpsc::Sender<Event>,
+    write_times: WriteTimes,
     guard: Guard,
 ) -> std::io::Result<(mpsc::Sender<StoreCommand>, JoinHandle<()>)> {
     let (sender, mut commands) = mpsc::channel(COMMANDS_MAX);
     let serve = move || {
         let _guard = guard;
-        serve(store.as_mut(), &mut commands, &events);
+        serve(store.as_mut(), &mut commands, &events, &write_times);
     };
     let thread = thread::Builder::new().name("store".to_owned()).spawn(serve)?;
     Ok((sender, thread))
@@ -62,9 +65,11 @@ pub(crate) fn serve(
     store: &mut dyn Store,
     commands: &mut mpsc::Receiver<StoreCommand>,
     events: &mpsc::Sender<Event>,
+    write_times: &WriteTimes,
 ) {
     let mut inbox = Inbox { commands, next: None };
-    let mut desk = PendingWork { events, readings: VecDeque::new(), copies: VecDeque::new() };
+    let (readings, copies) = (VecDeque::new(), VecDeque::new());
+    let mut desk = PendingWork { events, write_times, readings, copies };
     loop {
         let command = if desk.readings.is_empty() && desk.copies.is_empty() {
             match inbox.wait() {
@@ -131,6 +136,7 @@ pub(crate) type CopyReply = oneshot::Sender<Result<Option<File>, StoreError>>;
 /// Work that is done piece by piece, between commands.
 struct PendingWork<'a> {
     events: &'a mpsc::Sender<Event>,
+    write_times: &'a WriteTimes,
     /// As many as there are fetches under way.
     readings: VecDeque<ReadRequest>,
     /// One copy, and perhaps another whose reader has gone.
@@ -141,9 +147,15 @@ impl PendingWork<'_> {
     fn run(&mut self, store: &mut dyn Store, inbox: &mut Inbox<'_>, command: StoreCommand) {
         match command {
             StoreCommand::Put(record) => {
-                // The receiver is gone when the coordinator has stopped.
-                let mut report = |event| drop(self.events.blocking_send(event));
+                let begun = Instant::now();
+                let mut took = None;
+                let mut report = |event| {
+                    took.get_or_insert_with(|| begun.elapsed());
+                    // The receiver is gone when the coordinator has stopped.
+                    drop(self.events.blocking_send(event));
+                };
                 inbox.group(record, &mut self.readings).write(store, &mut report);
+                self.write_times.add(took.unwrap_or_else(|| begun.elapsed()));
             }
             StoreCommand::Read { job, number } => {
                 let found = store.evaluation(job, number).map_err(|error| unread(job, error));

@@ -12,7 +12,7 @@ use osteon_common::version;
 
 use super::*;
 use crate::config::Config;
-use crate::core::effect::{Answer, Effect, Record, RecordKey};
+use crate::core::effect::{Answer, Effect, Record, RecordKey, Refusal};
 
 use crate::core::event::{Hello, Request};
 use crate::core::ids::{BatchId, JobId, ReplyId, WorkerId};
@@ -22,6 +22,7 @@ mod ahead;
 mod checks;
 mod completion;
 mod dispatch;
+mod explain;
 mod fairness;
 mod jobs;
 mod lost;
@@ -31,6 +32,7 @@ mod prune;
 mod replay;
 mod saved;
 mod speculation;
+mod tally;
 mod workers;
 
 /// One minute.
@@ -263,6 +265,7 @@ fn answered(answer: &Answer) -> String {
             let jobs: Vec<&str> = snapshots.iter().map(|snapshot| snapshot.job.as_str()).collect();
             format!("{jobs:?}, more after {more_after:?}")
         }
+        Answer::Explained(explained) => format!("{:?}", explained.reason()),
         Answer::Ended(end) => format!("ended {}", end.job),
         Answer::Pruned(jobs) => format!("pruned {}", jobs.len()),
         Answer::Banned(banned) => format!("banned {}", banned.len()),

@@ -17,6 +17,7 @@ use super::*;
 use crate::core::effect::Record;
 use crate::core::effect::RecordKey;
 use crate::core::event::Event;
+use crate::metrics::write_times::WriteTimes;
 use crate::store::memory::MemoryStore;
 use crate::store::thread::{StoreCommand, serve};
 use crate::store::{EvaluationRecord, JobRecord};
@@ -179,7 +180,7 @@ fn a_fetch_lets_others_have_the_store_in_between() {
     sender.try_send(StoreCommand::Put(Record::Job(other))).unwrap();
     sender.try_send(StoreCommand::Prune { reply_id: None, jobs: vec![JOB] }).unwrap();
     drop(sender);
-    serve(&mut store, &mut commands, &events);
+    serve(&mut store, &mut commands, &events, &WriteTimes::default());
     assert_eq!(done.try_recv().unwrap(), Event::Stored { job: JobId(2), key: RecordKey::Job });
     assert!(matches!(done.try_recv().unwrap(), Event::Pruned { outcome: Ok(()), .. }));
     let mut read = fetches.into_iter().map(|mut fetched| fetched.try_recv().unwrap());

@@ -11,6 +11,8 @@ use osteon_common::version;
 use super::{jobs, prune, workers};
 use crate::core::effect::{Answer, Effect, Record, Refusal};
 use crate::core::event::Request;
+use crate::core::explain;
+use crate::core::explain::facts::JobFacts;
 use crate::core::ids::{JobId, ReplyId, WorkerId};
 use crate::core::job::{Job, RequestName, Stage, identity};
 use crate::core::reactor::turn::Turn;
@@ -32,6 +34,7 @@ pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, request: Request) {
             }
         }
         Request::Get(job) => Some(get(turn.state, job, turn.now)),
+        Request::Explain(job) => Some(explain(turn.state, job, turn.now)),
         Request::List { after, limit } => Some(list(turn.state, after, limit, turn.now)),
         Request::Cancel(job) => cancel(turn, reply_id, job),
         Request::Fetch(job) => Some(fetch(turn.state, job)),
@@ -153,6 +156,12 @@ fn resubmit(
 fn get(state: &State, job: JobId, now: Duration) -> Answer {
     snapshot::job_snapshot(state, job, now)
         .map_or(Answer::Refused(Refusal::NoJob { job }), Answer::Snapshot)
+}
+
+fn explain(state: &State, job: JobId, now: Duration) -> Answer {
+    JobFacts::new(state, job, now).map_or(Answer::Refused(Refusal::NoJob { job }), |facts| {
+        Answer::Explained(explain::explanation(&facts))
+    })
 }
 
 fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Answer {

@@ -5,6 +5,7 @@ use tokio::sync::{mpsc, oneshot};
 use super::*;
 use crate::core::effect::{Record, RecordKey};
 use crate::core::event::Event;
+use crate::metrics::write_times::WriteTimes;
 use crate::store::group::{GROUP_RECORDS_MAX, Group};
 use crate::store::job_output::ReadRequest;
 use crate::store::thread::{StoreCommand, serve};
@@ -240,7 +241,7 @@ fn check_commands(commands: Vec<StoreCommand>, expected: usize, marks: u64) {
         assert!(sender.try_send(command).is_ok());
     }
     drop(sender);
-    serve(&mut store, &mut waiting, &events);
+    serve(&mut store, &mut waiting, &events, &WriteTimes::default());
     let mut told = Vec::new();
     while let Ok(event) = reports.try_recv() {
         told.push(match event {
@@ -302,7 +303,7 @@ fn what_is_deleted_between_two_groups_is_gone_after_both() {
         assert!(sender.try_send(command).is_ok());
     }
     drop(sender);
-    serve(&mut store, &mut waiting, &events);
+    serve(&mut store, &mut waiting, &events, &WriteTimes::default());
     let stored = |id| Event::Stored { job: JobId(id), key: RecordKey::Job };
     let pruned = Event::Pruned { reply_id: None, jobs: vec![JobId(3)], outcome: Ok(()) };
     for expected in [stored(3), stored(4), pruned, stored(5), stored(6)] {

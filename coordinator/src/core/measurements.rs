@@ -1,0 +1,127 @@
+//! Measurements: the numbers that describe a state at one moment, for monitoring. They contain no
+//! names of users, jobs and hosts.
+
+use std::time::Duration;
+
+use osteon_common::job::JobKind;
+use osteon_proto::v1::WorkerState;
+
+use crate::core::job::{Job, Stage};
+use crate::core::reactor::realizations_held;
+use crate::core::state::{AttachedWorker, State};
+use crate::core::worker_list;
+
+/// A slot is worth having for a job if it is busy for this long in each evaluation, s. Batches that
+/// take less cost more than they bring.
+const WORTH_S: f64 = 0.02;
+/// Time of a realization, s, that is assumed before the first answer of a job.
+const USUAL_S: f64 = 1e-3;
+
+/// A state at one moment, in numbers.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct StateMeasurements {
+    pub(crate) jobs_waiting: u64,
+    pub(crate) jobs_running: u64,
+    pub(crate) jobs_ended: u64,
+    /// Realizations of the evaluations under way that no worker holds.
+    pub(crate) realizations_waiting: u64,
+    pub(crate) slots_busy: u64,
+    pub(crate) slots_idle: u64,
+    /// Free slots of workers that drain or are on probation.
+    pub(crate) slots_unavailable: u64,
+    /// Slots that the jobs which have not ended could keep busy together.
+    pub(crate) slots_wanted: u64,
+    pub(crate) workers_ok: u64,
+    pub(crate) workers_draining: u64,
+    pub(crate) workers_distrusted: u64,
+    pub(crate) workers_on_probation: u64,
+    pub(crate) workers_banned: u64,
+    pub(crate) batches_in_flight: u64,
+    /// Time since the oldest batch that a worker holds was sent.
+    pub(crate) oldest_batch: Duration,
+    /// Time since which the store has refused a record.
+    pub(crate) store_refusing: Duration,
+}
+
+impl StateMeasurements {
+    /// Measures a state.
+    pub(crate) fn new(state: &State, now: Duration) -> Self {
+        let since =
+            |then: Option<Duration>| then.map_or(Duration::ZERO, |it| now.saturating_sub(it));
+        let mut measured = Self {
+            jobs_ended: state.ended.len() as u64,
+            workers_banned: state.banned.len() as u64,
+            batches_in_flight: state.batches.len() as u64,
+            oldest_batch: since(state.batches.values().map(|batch| batch.sent).min()),
+            store_refusing: since(refused_since(state)),
+            ..Self::default()
+        };
+        for job in state.jobs.values() {
+            measured.add_job(job);
+        }
+        for worker in state.workers.values() {
+            measured.add_worker(state, worker);
+        }
+        measured
+    }
+
+    fn add_job(&mut self, job: &Job) {
+        match job.stage {
+            // No client knows it yet.
+            Stage::StoringSubmission => {}
+            Stage::Waiting => self.jobs_waiting += 1,
+            _ => self.jobs_running += 1,
+        }
+        for evaluation in job.certain() {
+            self.realizations_waiting += evaluation.queued() + evaluation.quarantine.len() as u64;
+        }
+        self.slots_wanted += slots_wanted(job);
+    }
+
+    fn add_worker(&mut self, state: &State, worker: &AttachedWorker) {
+        let slots = u64::from(worker.hello.slots);
+        let busy = realizations_held(state, worker).min(slots);
+        self.slots_busy += busy;
+        if state.is_sound(worker) {
+            self.slots_idle += slots - busy;
+        } else {
+            self.slots_unavailable += slots - busy;
+        }
+        *match worker_list::worker_state(state, worker) {
+            WorkerState::Ok | WorkerState::Unspecified => &mut self.workers_ok,
+            WorkerState::Draining => &mut self.workers_draining,
+            WorkerState::Distrusted => &mut self.workers_distrusted,
+            WorkerState::Probation => &mut self.workers_on_probation,
+        } += 1;
+    }
+}
+
+/// Returns the number of slots that a job could keep busy. A search counts with all realizations of
+/// an evaluation until it ends, because the next evaluation follows at once: otherwise the number
+/// would fall to nothing at the end of each. Its groups and starts are computed at the same time, so
+/// each that is left counts.
+fn slots_wanted(job: &Job) -> u64 {
+    let specification = &job.record.specification;
+    let all = specification.monte_carlo.realizations;
+    let realizations = match (&job.stage, specification.kind) {
+        (Stage::StoringSubmission | Stage::StoringEnd(_), _) => 0,
+        (
+            Stage::Completing(_) | Stage::StoringEvaluation { .. } | Stage::StoringPrepared { .. },
+            JobKind::Propagation,
+        ) => 0,
+        (Stage::Computing(evaluation), JobKind::Propagation) => all - evaluation.filled().min(all),
+        _ => all.saturating_mul(job.search.parts().saturating_sub(job.search.part())),
+    };
+    let each = job.pace.expected(1, 1).map_or(USUAL_S, |time| time.as_secs_f64());
+    let worth = (realizations as f64 * each / WORTH_S).ceil();
+    // `as` saturates.
+    (worth as u64).clamp(realizations.min(1), realizations)
+}
+
+/// Returns the time since which a record has been refused by the store; the oldest, if there are
+/// several.
+fn refused_since(state: &State) -> Option<Duration> {
+    let jobs = state.jobs.values().filter_map(|job| Some(job.store_retry.as_ref()?.since));
+    let bans = state.banned.iter().filter(|banned| banned.refused).map(|banned| banned.record.at);
+    jobs.chain(bans).min()
+}
