@@ -1,14 +1,13 @@
 //! Checks the crates that osteon is built from with cargo-deny: licences, versions, sources and, if
 //! the advisory database can be fetched, known vulnerabilities. The rules are in `deny.toml`.
 
-use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{announce, cargo, cargo_command, programs, root};
+use crate::{announce, cargo, installed, root};
 
 /// The version of cargo-deny for which the rules are written.
 const VERSION: &str = "0.20.2";
@@ -22,7 +21,7 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
     if !words.is_empty() {
         bail!("usage: cargo xtask deny");
     }
-    let program = program()?;
+    let program = installed("cargo-deny", VERSION, &[])?;
     let deny = |arguments: &[&str]| {
         let mut command = Command::new(&program);
         command.args(arguments).current_dir(root());
@@ -34,22 +33,6 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
     }
     eprintln!("advisories are not checked: their database cannot be had from here");
     Ok(())
-}
-
-/// Returns the path of cargo-deny, which is installed below the target directory at the first call.
-fn program() -> Result<PathBuf> {
-    let tools = programs()?.with_file_name("tools");
-    let program = tools.join("bin/cargo-deny");
-    let version = Command::new(&program).arg("--version").output();
-    let installed = version.is_ok_and(|output| {
-        String::from_utf8_lossy(&output.stdout).trim().ends_with(&format!(" {VERSION}"))
-    });
-    if !installed {
-        let install =
-            ["install", "cargo-deny", "--version", VERSION, "--locked", "--force", "--root"];
-        cargo(cargo_command(&install).arg(&tools))?;
-    }
-    Ok(program)
 }
 
 /// Returns whether the advisory database could be fetched in time.

@@ -2,6 +2,7 @@
 
 mod chaos;
 mod deny;
+mod deploy;
 mod digests;
 mod metrics;
 mod python;
@@ -74,9 +75,14 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(metrics::check),
     ),
     (
+        "deploy",
+        "checks deploy/: Helm chart, units, Debian package, image; takes names of test files",
+        Action::Function(deploy::check),
+    ),
+    (
         "ci",
-        "what CI runs: lint, deny, every test, metrics, the client in Python",
-        Action::Commands(&["lint", "deny", "test", "metrics", "python"]),
+        "what CI runs: lint, deny, every test, metrics, the client in Python, deploy",
+        Action::Commands(&["lint", "deny", "test", "metrics", "python", "deploy"]),
     ),
     (
         "tables",
@@ -192,6 +198,21 @@ fn say(text: &str) -> Result<()> {
 fn programs() -> Result<PathBuf> {
     let here = env::current_exe().context("cannot tell where xtask is")?;
     Ok(here.parent().context("xtask has no directory")?.to_owned())
+}
+
+/// Returns the path of a program of crates.io of this version, which is installed below the target
+/// directory, with these options of `cargo install`, unless it is there.
+fn installed(name: &str, version: &str, options: &[&str]) -> Result<PathBuf> {
+    let tools = programs()?.with_file_name("tools");
+    let program = tools.join("bin").join(name);
+    let present = Command::new(&program).arg("--version").output().is_ok_and(|output| {
+        String::from_utf8_lossy(&output.stdout).trim().split(' ').next_back() == Some(version)
+    });
+    if !present {
+        let install = ["install", name, "--version", version, "--locked", "--force", "--root"];
+        cargo(cargo_command(&install).arg(&tools).args(options))?;
+    }
+    Ok(program)
 }
 
 /// Returns the root of the workspace.

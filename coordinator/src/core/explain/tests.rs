@@ -183,4 +183,6 @@ fn a_sequential_search_cannot_use_more_slots_than_realizations() {
         &["It has 10 realizations"],
     );
     assert!(!propagation.text.contains("search"), "{}", propagation.text);
+    // Its groups and starts are computed at the same time.
+    check(JobFacts { parts_left: 7, ..few() }, PaceReason::Computing, &[]);
 }
