@@ -3,6 +3,7 @@
 mod check;
 mod operators;
 mod realizations;
+mod slurm;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -15,6 +16,10 @@ use crate::program;
 pub(crate) use check::CheckArguments;
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
+pub(crate) use slurm::{
+    AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
+    WorkerArrayArguments,
+};
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
@@ -50,6 +55,8 @@ pub(crate) enum Command {
     Jobs(JobsArguments),
     /// List the workers of a coordinator
     Workers(WorkersArguments),
+    /// Print batch scripts for Slurm
+    Slurm(SlurmArguments),
     /// Check whether a coordinator is serving: exit code 0 if it is, otherwise 1
     Health(HealthArguments),
     /// Copy the store of a coordinator while it runs
@@ -201,6 +208,9 @@ pub(crate) struct WorkerArguments {
     /// Finish the current work and exit after this many seconds [default: never]
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub(crate) time_limit: Option<f64>,
+    /// Exit after this many seconds without work, or without a coordinator [default: never]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) idle_timeout: Option<f64>,
 }
 
 /// Credentials for a coordinator, and the authorities that certify it.

@@ -1,12 +1,13 @@
 //! The command line with environment and defaults resolved; files have not been read yet.
 
+mod slurm;
+
 use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::anyhow;
 use osteon_common::job::JobKind;
 use osteon_proto::credentials::{CredentialFiles, Credentials};
-use osteon_proto::endpoint::Endpoint;
 use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
@@ -20,6 +21,9 @@ use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
 use crate::exit_status::CommandFailure;
 use crate::request_id::RequestId;
+use crate::slurm::job_script::JobScript;
+
+pub(crate) use slurm::{ScalingPlan, WorkerArray};
 
 /// Default number of worker processes of a run on this machine.
 const WORKERS_DEFAULT: u32 = 2;
@@ -136,6 +140,12 @@ pub(crate) enum Resolved {
         /// Output format.
         format: OutputFormat,
     },
+    /// `workers slurm`.
+    ScaleWorkers(Box<ScalingPlan>),
+    /// `slurm script`.
+    JobScript(Box<JobScript>),
+    /// `slurm array`.
+    WorkerArray(Box<WorkerArray>),
     /// `health`.
     Health {
         /// The coordinator to ask.
@@ -247,13 +257,7 @@ impl Resolved {
                 Self::Observe { arguments, isa: isa()?, threads }
             }
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
-            Command::Worker(arguments) => {
-                let endpoint = environment.needed(arguments.coordinator.clone())?;
-                let given = arguments.credentials.clone().into();
-                let (files, unused) = environment.files(given, &endpoint);
-                let config = resolve_worker(&arguments, endpoint, cores, isa()?);
-                Self::Worker { config, files, unused }
-            }
+            Command::Worker(arguments) => resolve_worker(arguments, &environment, cores, isa()?)?,
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
@@ -263,6 +267,7 @@ impl Resolved {
             }
             Command::Jobs(arguments) => resolve_jobs(arguments, remote)?,
             Command::Workers(arguments) => resolve_workers(arguments, remote)?,
+            Command::Slurm(arguments) => slurm::scripts(arguments, remote)?,
             Command::Health(arguments) => Self::Health {
                 coordinator: remote(arguments.client)?,
                 limit: Duration::from_secs_f64(arguments.timeout),
@@ -290,7 +295,7 @@ impl Resolved {
     /// Returns the default log level: services log their events, commands only problems.
     pub(crate) fn default_log_level(&self) -> &'static str {
         match self {
-            Self::Coordinator(_) | Self::Worker { .. } => "info",
+            Self::Coordinator(_) | Self::Worker { .. } | Self::ScaleWorkers(_) => "info",
             _ => "warn",
         }
     }
@@ -364,23 +369,31 @@ fn resolve_workers(
             coordinator: remote(drain.client.or(client))?,
             format: format(json || drain.json),
         },
+        Some(WorkersCommand::Slurm(scaling)) => {
+            let coordinator = remote(scaling.client.clone().or(client))?;
+            slurm::scaling(*scaling, coordinator)?
+        }
     })
 }
 
 fn resolve_worker(
-    arguments: &WorkerArguments,
-    endpoint: Endpoint,
+    arguments: WorkerArguments,
+    environment: &Environment,
     cores: u32,
     isa: Isa,
-) -> WorkerConfig {
-    WorkerConfig {
+) -> Result<Resolved, CommandFailure> {
+    let endpoint = environment.needed(arguments.coordinator)?;
+    let (files, unused) = environment.files(arguments.credentials.into(), &endpoint);
+    let config = WorkerConfig {
         endpoint,
         credentials: Credentials::default(),
         threads: arguments.threads.unwrap_or(cores),
         isa,
         give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),
         time_limit: arguments.time_limit.map(Duration::from_secs_f64),
-    }
+        idle_timeout: arguments.idle_timeout.map(Duration::from_secs_f64),
+    };
+    Ok(Resolved::Worker { config, files, unused })
 }
 
 impl From<CredentialArguments> for CredentialFiles {
@@ -408,76 +421,4 @@ fn resolve_submit(
 }
 
 #[cfg(test)]
-mod tests {
-    use std::ffi::OsString;
-
-    use clap::Parser as _;
-
-    use super::*;
-
-    fn run(line: &str, cores: u32, coordinator: Option<&str>) -> Run {
-        let words = line.split_whitespace();
-        let command = Arguments::try_parse_from(words).unwrap().command;
-        let (Command::Identify(arguments) | Command::Propagate(arguments)) = command else {
-            panic!("{line} is no run");
-        };
-        let environment = environment(coordinator);
-        resolve_run(JobKind::Identification, arguments, cores, &environment).unwrap()
-    }
-
-    /// An environment with this coordinator, and files for it.
-    fn environment(coordinator: Option<&str>) -> Environment {
-        let files = ["OSTEON_TLS_CA", "OSTEON_TOKEN_FILE"];
-        Environment::read(|name| match name {
-            "OSTEON_COORDINATOR" => coordinator.map(OsString::from),
-            name => files.contains(&name).then(|| OsString::from("file")),
-        })
-        .unwrap()
-    }
-
-    fn here(line: &str, cores: u32) -> (u32, u32) {
-        match run(line, cores, None).location {
-            RunLocation::Local { workers, threads } => (workers, threads),
-            RunLocation::Coordinator(remote) => panic!("{}", remote.endpoint),
-        }
-    }
-
-    #[test]
-    fn threads_share_the_cores() {
-        assert_eq!(here("osteon identify a.toml", 8), (2, 4));
-        assert_eq!(here("osteon identify a.toml", 1), (2, 1));
-        assert_eq!(here("osteon identify a.toml --workers 3", 8), (3, 2));
-        assert_eq!(here("osteon identify a.toml --workers 1", 8), (1, 8));
-        assert_eq!(here("osteon propagate a.toml --threads 5", 8), (2, 5));
-        assert_eq!(here("osteon identify a.toml --workers 16", 8), (16, 1));
-    }
-
-    #[test]
-    fn the_flag_counts_before_the_environment() {
-        let there = |line: &str, environment| match run(line, 2, environment).location {
-            RunLocation::Coordinator(remote) => Some(remote.endpoint.to_string()),
-            RunLocation::Local { .. } => None,
-        };
-        let environment = Some("unix:/run/osteon");
-        let flag = "osteon identify a.toml --coordinator http://a:1";
-        assert_eq!(there("osteon identify a.toml", None), None);
-        assert_eq!(there("osteon identify a.toml", Some("")), None);
-        assert_eq!(there("osteon identify a.toml", environment), Some("unix:/run/osteon".into()));
-        assert_eq!(there(flag, environment), Some("http://a:1".into()));
-        assert_eq!(there("osteon identify a.toml --workers 1", environment), None);
-    }
-
-    #[test]
-    fn an_environment_that_is_no_address_is_bad_input() {
-        let words = ["osteon", "identify", "a.toml"];
-        let Command::Identify(arguments) = Arguments::try_parse_from(words).unwrap().command else {
-            panic!("no run");
-        };
-        let failure =
-            resolve_run(JobKind::Identification, arguments, 2, &environment(Some("nowhere")))
-                .unwrap_err();
-        assert_eq!(failure.exit_code(), 2);
-        assert!(failure.to_string().contains("OSTEON_COORDINATOR"), "{failure}");
-        assert!(failure.to_string().contains("`nowhere`"), "{failure}");
-    }
-}
+mod tests;
