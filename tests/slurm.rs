@@ -4,6 +4,10 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
 #[cfg(test)]
+#[path = "support/secure.rs"]
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod secure;
+#[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
@@ -14,6 +18,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use secure::Secure;
 use support::{Coordinator, Finished, Owned, Scratch, eventually, job, osteon, run, text};
 
 /// Starts a step on this machine and notes its process, by which `scancel` finds it.
@@ -220,6 +225,39 @@ fn workers_of_an_array_end_one_after_the_other() {
     };
     let lifetimes = ["100", "101", "102", "103"].map(lifetime);
     assert_eq!(lifetimes, [3060, 3290, 3519, 3148]);
+}
+
+#[test]
+fn over_tls_the_environment_names_all_that_workers_need() {
+    let stage = Stage::new();
+    let secure = Secure::start();
+    let certificate = |name: &str| secure.scratch.path("certs").join(name);
+    let read = secure.scratch.path("read.token");
+    let variables = [
+        ("OSTEON_COORDINATOR", PathBuf::from(&secure.url)),
+        ("OSTEON_TLS_CA", certificate("ca.pem")),
+        ("OSTEON_TLS_CERT", certificate("worker.pem")),
+        ("OSTEON_TLS_KEY", certificate("worker-key.pem")),
+        ("OSTEON_TOKEN_FILE", read.clone()),
+    ];
+    let print = |words: &[&str]| {
+        let mut command = osteon();
+        command.args(words).args(["--cpus-per-worker", "1"]).envs(variables.clone());
+        Finished::of(stage.with(&mut command).output().unwrap()).succeeded().to_owned()
+    };
+    let told = print(&["workers", "slurm", "--min", "1", "--max", "2", "--dry-run"]);
+    assert!(told.contains("1 workers would be submitted"), "{told}");
+    let script = print(&["slurm", "array", "--count", "1", "--idle-timeout", "1s"]);
+    assert!(!script.contains(text(&read)), "workers need no token: {script}");
+    let script = stage.scratch.write("script", &script);
+    let mut command = Command::new("bash");
+    command.arg(script).env("SLURM_JOB_ID", "5").env("SLURM_CPUS_ON_NODE", "1");
+    let mut worker = Owned::spawn_logging(&mut command, &stage.path("log"));
+    // It attaches, finds no work, and leaves.
+    assert_eq!(worker.code(), Some(0), "{}", stage.log());
+    let log = stage.log();
+    assert!(log.contains("attached") && log.contains("by=\"the idle timeout\""), "{log}");
+    assert!(secure.read("coordinator.log").contains("this worker has drained"));
 }
 
 #[test]

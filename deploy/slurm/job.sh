@@ -30,7 +30,7 @@ end() {
     runs "$process" || return 0
     if [[ -n ${3:-} ]] && read -r step <"$private/$3.step"; then
         # It may say that there is no such step after it has signalled it.
-        scancel --quiet --signal=TERM "$SLURM_JOB_ID.$step" 2>/dev/null || true
+        timeout 10 scancel --quiet --signal=TERM "$SLURM_JOB_ID.$step" 2>/dev/null || true
     else
         kill -TERM "$process" 2>/dev/null || true
     fi
@@ -47,7 +47,7 @@ end_all() {
     end "$client" "$client_s_max"
     end "$workers" "$workers_s_max" workers
     end "$coordinator" "$coordinator_s_max" coordinator
-    if [[ -n $private ]]; then rm -rf -- "$private"; fi
+    if [[ -n $private ]]; then rm -rf -- "$private" || say "delete $private, which holds a token"; fi
 }
 
 requeue() {
@@ -56,7 +56,7 @@ requeue() {
     trap - EXIT
     ((restarts < requeues_max)) || fail "not queued again: this job has been requeued $restarts times, and at most" \
         "$requeues_max are allowed (--max-requeues). Submit the same script again to continue"
-    scontrol requeue "$SLURM_JOB_ID" || fail "Slurm does not requeue the job; submit the same script again to continue"
+    timeout 60 scontrol requeue "$SLURM_JOB_ID" || fail "Slurm does not requeue the job; submit the same script again to continue"
     # Slurm ends this process now.
     sleep 60
     exit 0

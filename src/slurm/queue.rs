@@ -51,8 +51,9 @@ fn worker(line: &str) -> Result<QueuedWorker, SlurmError> {
     let malformed = || SlurmError::NotUnderstood { program: "squeue", line: line.to_owned() };
     let fields: Vec<&str> = line.trim().splitn(5, '|').collect();
     let [id, name, state, used, reason] = fields[..] else { return Err(malformed()) };
-    let known = !id.is_empty() && id.chars().all(|c| c.is_ascii_digit() || "_[]-,%".contains(c));
-    if !known {
+    // It becomes an argument of `scancel`.
+    let known = |c: char| c.is_ascii_digit() || "_[]-,%".contains(c);
+    if !id.starts_with(|c: char| c.is_ascii_digit()) || !id.chars().all(known) {
         return Err(malformed());
     }
     Ok(QueuedWorker {
