@@ -31,7 +31,7 @@ pub(crate) fn test(words: &[String]) -> Result<()> {
     command.current_dir(root()).env("PYTHONDONTWRITEBYTECODE", "1");
     command.arg("deploy/slurm/test/run.py").arg("--osteon").arg(programs()?.join("osteon"));
     command.args(words.iter().filter(|word| *word != IF_INSTALLED));
-    cargo(&mut command).context("the tests of Slurm need Python 3.10 or later")
+    cargo(&mut command).context("the tests on Slurm did not pass (they need Python 3.10 or later)")
 }
 
 /// Returns whether a program is on the path, or where Debian keeps daemons.

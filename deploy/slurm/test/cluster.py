@@ -114,6 +114,13 @@ class Cluster:
         """Starts a node's daemon."""
         self._spawn(name, "slurmd", "-D", "-N", name, "-f", self.work / "slurm.conf")
 
+    def return_node(self, name):
+        """Starts a node that was lost, and waits until Slurm uses it again."""
+        self.start_node(name)
+        # Refused where the node has reported already, by which it returns (ReturnToService).
+        self.call("scontrol", "update", f"nodename={name}", "state=resume", check=False)
+        self.wait_for_nodes("idle|allocated|mixed|completing", [name])
+
     def wait_for_nodes(self, state, names=NODES):
         """Waits until these nodes have the state."""
 

@@ -136,8 +136,7 @@ def a_job_survives_a_lost_node_and_is_queued_again(slurm, osteon, work):
     loses("n3")
     restarts(2)
     reaches(before + 4)
-    slurm.start_node("n3")
-    slurm.call("scontrol", "update", "nodename=n3", "state=resume")
+    slurm.return_node("n3")
     before = evaluations()
     loses("n1")
     restarts(3)
@@ -150,11 +149,10 @@ def a_job_survives_a_lost_node_and_is_queued_again(slurm, osteon, work):
     assert not (store / f"slurm-{job}").exists(), "certificates and token were left behind"
     log = (work / f"job-{job}.log").read_text()
     end = log.partition("the time limit is near")[2].partition("jobs recovered")[0]
-    assert end and "worker lost" not in end, log
-    # In order: workers handed back what they held, and the coordinator closed its store.
+    # In order: workers drained, and the coordinator closed its store. (A batch that was on its way
+    # to an idle worker when that left is logged as lost, and computed by others.)
     assert end.count("draining") == 3 and "stopped" in end, log
-    slurm.start_node("n1")
-    slurm.call("scontrol", "update", "nodename=n1", "state=resume")
+    slurm.return_node("n1")
     slurm.wait_for_nodes("idle")
 
 
