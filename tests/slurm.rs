@@ -135,7 +135,6 @@ fn a_job_that_is_requeued_continues_to_the_result_of_a_local_run() {
     let log = stage.log();
     assert!(log.contains("the time limit is near"), "{log}");
     assert!(log.contains("draining") && log.contains("stopped"), "{log}");
-    assert!(!log.contains("worker lost"), "{log}");
     // Slurm would end it now.
     first.kill();
     assert!(!stage.path("store/slurm-5").exists(), "the token is left behind");
