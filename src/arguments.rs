@@ -4,6 +4,7 @@ mod check;
 mod operators;
 mod realizations;
 mod services;
+mod slurm;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -17,6 +18,10 @@ pub(crate) use check::CheckArguments;
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
+pub(crate) use slurm::{
+    AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
+    WorkerArrayArguments,
+};
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
@@ -52,6 +57,8 @@ pub(crate) enum Command {
     Jobs(JobsArguments),
     /// List the workers of a coordinator
     Workers(WorkersArguments),
+    /// Print batch scripts for Slurm
+    Slurm(SlurmArguments),
     /// Check whether a coordinator is serving: exit code 0 if it is, otherwise 1
     Health(HealthArguments),
     /// Copy the store of a coordinator while it runs

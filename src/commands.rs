@@ -8,8 +8,10 @@ mod jobs;
 mod observe;
 mod operators;
 mod run;
+mod scaling;
 mod schema;
 mod simulate;
+mod slurm;
 mod token;
 mod worker;
 
@@ -81,6 +83,13 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
             let left = "the worker may have been told to drain (see `osteon workers`)";
             unless_interrupted(operators::drain(worker, &coordinator, format), left).await
         }
+        Resolved::ScaleWorkers(plan) => {
+            let left =
+                "workers that wait or run stay, and end when they have had no work for a while";
+            unless_interrupted(scaling::follow(*plan), left).await
+        }
+        Resolved::JobScript(script) => slurm::job(&script),
+        Resolved::WorkerArray(array) => slurm::array(&array),
         Resolved::Health { coordinator, limit, format } => {
             unless_interrupted(operators::health(&coordinator, limit, format), NOTHING_LEFT).await
         }

@@ -31,6 +31,7 @@ mod results_directory;
 mod sample_result;
 mod signals;
 mod simulation_directory;
+mod slurm;
 mod unsearched_groups;
 mod warnings;
 

@@ -1,5 +1,7 @@
 //! The command line with environment and defaults resolved; files have not been read yet.
 
+mod slurm;
+
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -19,6 +21,9 @@ use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
 use crate::exit_status::CommandFailure;
 use crate::request_id::RequestId;
+use crate::slurm::job_script::JobScript;
+
+pub(crate) use slurm::{ScalingPlan, WorkerArray};
 
 /// Default number of worker processes of a run on this machine.
 const WORKERS_DEFAULT: u32 = 2;
@@ -137,6 +142,12 @@ pub(crate) enum Resolved {
         /// Output format.
         format: OutputFormat,
     },
+    /// `workers slurm`.
+    ScaleWorkers(Box<ScalingPlan>),
+    /// `slurm script`.
+    JobScript(Box<JobScript>),
+    /// `slurm array`.
+    WorkerArray(Box<WorkerArray>),
     /// `health`.
     Health {
         /// The coordinator to ask.
@@ -267,6 +278,7 @@ impl Resolved {
             }
             Command::Jobs(arguments) => resolve_jobs(arguments, remote)?,
             Command::Workers(arguments) => resolve_workers(arguments, remote)?,
+            Command::Slurm(arguments) => slurm::scripts(arguments, remote)?,
             Command::Health(arguments) => Self::Health {
                 coordinator: remote(arguments.client)?,
                 limit: Duration::from_secs_f64(arguments.timeout),
@@ -308,7 +320,7 @@ impl Resolved {
     /// Returns the default log level: services log their events, commands only problems.
     pub(crate) fn default_log_level(&self) -> &'static str {
         match self {
-            Self::Coordinator(_) | Self::Worker { .. } => "info",
+            Self::Coordinator(_) | Self::Worker { .. } | Self::ScaleWorkers(_) => "info",
             _ => "warn",
         }
     }
@@ -382,6 +394,10 @@ fn resolve_workers(
             coordinator: remote(drain.client.or(client))?,
             format: format(json || drain.json),
         },
+        Some(WorkersCommand::Slurm(scaling)) => {
+            let coordinator = remote(scaling.client.clone().or(client))?;
+            slurm::scaling(*scaling, coordinator)?
+        }
     })
 }
 
@@ -400,6 +416,7 @@ fn resolve_worker(
         isa,
         give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),
         time_limit: arguments.time_limit.map(Duration::from_secs_f64),
+        idle_timeout: arguments.idle_timeout.map(Duration::from_secs_f64),
     };
     Ok(Resolved::Worker { config, files, unused, log_format: arguments.log_format })
 }

@@ -8,6 +8,7 @@ mod support;
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use osteon_files::job_file;
 
@@ -153,6 +154,23 @@ fn the_cluster_pages_commands_for_operators_run_as_they_stand() {
         assert!(output.status.success(), "osteon {command}: {errors}");
     }
     assert!(scratch.path("monday/osteon.sqlite").exists());
+}
+
+#[test]
+fn the_slurm_pages_commands_print_scripts_that_bash_can_read() {
+    let scratch = Scratch::new();
+    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"), &scratch.path("examples"));
+    let all = commands("docs/slurm.md");
+    assert_eq!(all.len(), 2, "{all:?}");
+    for command in &all {
+        let arguments = command.split(" > ").next().unwrap_or_default();
+        let mut osteon = osteon();
+        osteon.args(arguments.split_whitespace()).current_dir(scratch.path("."));
+        let script = support::Finished::of(osteon.output().unwrap());
+        let script = scratch.write("script", script.succeeded());
+        let checked = Command::new("bash").arg("-n").arg(script).output().unwrap();
+        assert!(checked.status.success(), "osteon {command}: {checked:?}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{ClientArguments, probe_seconds};
+use super::{ClientArguments, ScalingArguments, probe_seconds};
 
 /// Arguments of `workers`.
 #[derive(Debug, Args)]
@@ -25,6 +25,11 @@ pub(crate) struct WorkersArguments {
 pub(crate) enum WorkersCommand {
     /// Drain a worker: it receives no new batches, completes or returns those it holds, and exits
     Drain(DrainArguments),
+    /// Submit workers to Slurm as long as jobs wait for them, until interrupted
+    ///
+    /// Workers end by themselves when they have had no work for the idle timeout. Those that wait in
+    /// Slurm's queue while there is no work are cancelled after the same time.
+    Slurm(Box<ScalingArguments>),
 }
 
 /// Arguments of `workers drain`.

@@ -89,6 +89,9 @@ pub(crate) struct WorkerArguments {
     /// Finish the current work and exit after this many seconds [default: never]
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub(crate) time_limit: Option<f64>,
+    /// Exit after this many seconds without work, or without a coordinator [default: never]
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub(crate) idle_timeout: Option<f64>,
     /// Format of the log on stderr
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t = LogFormat::Text)]
     pub(crate) log_format: LogFormat,

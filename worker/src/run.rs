@@ -48,10 +48,12 @@ pub struct WorkerConfig {
     /// Time after which the worker drains and ends, e.g. shortly before a batch system would kill
     /// it.
     pub time_limit: Option<Duration>,
+    /// Time without work, or without a coordinator, after which the worker ends; `None` to stay.
+    pub idle_timeout: Option<Duration>,
 }
 
-/// Serves a coordinator until `shutdown` completes or the time limit has passed; then finishes or
-/// returns the batches that it holds. Losing the coordinator is not an error: the worker attaches
+/// Serves a coordinator until `shutdown` completes, the time limit has passed, or there was no work
+/// for the idle timeout; then finishes or returns the batches that it holds. Losing the coordinator is not an error: the worker attaches
 /// again.
 ///
 /// # Errors
@@ -81,13 +83,14 @@ async fn run_on(
     shutdown: impl Future<Output = ()>,
 ) -> Result<(), WorkerError> {
     let (finished_sender, finished) = mpsc::channel(BATCHES_HELD_MAX);
+    let identity = Identity {
+        slots: backend.slots(),
+        host: host_name(),
+        process: std::process::id(),
+        instance: identity::random_number()?,
+    };
     let mut worker = Worker {
-        state: State::new(Identity {
-            slots: backend.slots(),
-            host: host_name(),
-            process: std::process::id(),
-            instance: identity::random_number()?,
-        }),
+        state: State::new(identity, config.idle_timeout),
         backend,
         finished_sender,
         finished,
@@ -105,7 +108,9 @@ async fn run_on(
         }
     };
     let leave = pin!(leave);
-    let served = worker.serve(config.give_up_after, leave).await;
+    // Without a coordinator there is no work either.
+    let give_up_after = config.give_up_after.into_iter().chain(config.idle_timeout).min();
+    let served = worker.serve(give_up_after, leave).await;
     info!(endpoint = %config.endpoint, "ended");
     served
 }
@@ -213,7 +218,7 @@ impl Worker {
             };
             let ended = self.apply(event, Some(&outbox))?;
             if !was_draining && self.state.is_draining() {
-                let by = if draining { "this machine" } else { "the coordinator" };
+                let by = self.drained_by(draining);
                 info!(by, "draining: answering the batches in hand, then leaving");
             }
             if let Some(end) = ended {
@@ -230,6 +235,15 @@ impl Worker {
             if !self.state.is_attached() && Instant::now() > hello_deadline {
                 return Ok(End::Lost("the coordinator does not answer".to_owned()));
             }
+        }
+    }
+
+    /// Returns who makes this worker drain; `asked` if its user or its time limit does.
+    fn drained_by(&self, asked: bool) -> &'static str {
+        match asked {
+            true => "this machine",
+            false if self.state.is_idle_too_long(self.started.elapsed()) => "the idle timeout",
+            false => "the coordinator",
         }
     }
 

@@ -108,6 +108,10 @@ pub(crate) struct State {
     evaluations: Received,
     /// Time at which draining began.
     draining_since: Option<Duration>,
+    /// Time without batches after which the worker drains.
+    idle_timeout: Option<Duration>,
+    /// Time since which the worker has held no batch; the present while it holds one.
+    idle_since: Duration,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,8 +128,9 @@ enum Link {
 }
 
 impl State {
-    /// Creates a worker without a coordinator.
-    pub(crate) fn new(identity: Identity) -> Self {
+    /// Creates a worker without a coordinator, which drains when it has been attached without a batch
+    /// for `idle_timeout`.
+    pub(crate) fn new(identity: Identity, idle_timeout: Option<Duration>) -> Self {
         Self {
             identity,
             attachments: 0,
@@ -134,6 +139,8 @@ impl State {
             held: BTreeSet::new(),
             evaluations: Received::default(),
             draining_since: None,
+            idle_timeout,
+            idle_since: Duration::ZERO,
         }
     }
 
@@ -166,6 +173,12 @@ impl State {
         self.draining_since.is_some()
     }
 
+    /// Returns whether the worker has been attached without a batch for its idle timeout.
+    pub(crate) fn is_idle_too_long(&self, now: Duration) -> bool {
+        let limit = self.idle_timeout.filter(|_| self.is_attached() && self.held.is_empty());
+        limit.is_some_and(|limit| now.saturating_sub(self.idle_since) >= limit)
+    }
+
     /// Returns the effects of `event`, which happens at `now`.
     pub(crate) fn react(&mut self, now: Duration, event: Event) -> Vec<Effect> {
         let mut effects = match event {
@@ -182,6 +195,9 @@ impl State {
         }
         if effects.iter().any(|effect| matches!(effect, Effect::Detach(_))) {
             effects.extend(self.on_lost());
+        }
+        if !self.held.is_empty() {
+            self.idle_since = now;
         }
         self.sanity_check();
         effects
@@ -212,6 +228,8 @@ impl State {
 
     fn on_welcome(&mut self, now: Duration, welcome: &v1::WorkerWelcome) -> Vec<Effect> {
         self.number = welcome.worker;
+        // The time without a coordinator does not count: work may have waited for this worker.
+        self.idle_since = now;
         let span = |seconds: f64| {
             // `max` turns a NaN into the lower limit.
             Duration::from_secs_f64(seconds.max(SPAN_S.0).min(SPAN_S.1))
@@ -289,6 +307,9 @@ impl State {
         let drained_for = self.draining_since.map(|since| now.saturating_sub(since));
         if drained_for.is_some_and(|span| span >= Duration::from_secs_f64(DRAIN_S_MAX)) {
             return vec![Effect::Leave];
+        }
+        if self.draining_since.is_none() && self.is_idle_too_long(now) {
+            return self.on_drain(now);
         }
         match self.link {
             Link::Attached { expiry, last_heard, .. }

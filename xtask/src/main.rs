@@ -8,6 +8,7 @@ mod metrics;
 mod python;
 mod random;
 mod reference;
+mod slurm;
 mod tables;
 
 use std::env;
@@ -26,8 +27,8 @@ enum Action {
     Cargo(&'static [Cargo]),
     /// Runs a function, which may take further words.
     Function(fn(&[String]) -> Result<()>),
-    /// Runs other commands, by name.
-    Commands(&'static [&'static str]),
+    /// Runs other commands: name and words of each.
+    Commands(&'static [&'static [&'static str]]),
 }
 
 const FORMAT: Cargo = &["fmt", "--all", "--check"];
@@ -81,8 +82,21 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "ci",
-        "what CI runs: lint, deny, every test, metrics, the client in Python, deploy",
-        Action::Commands(&["lint", "deny", "test", "metrics", "python", "deploy"]),
+        "what CI runs: lint, deny, every test, metrics, the client in Python, deploy, Slurm if installed",
+        Action::Commands(&[
+            &["lint"],
+            &["deny"],
+            &["test"],
+            &["metrics"],
+            &["python"],
+            &["deploy"],
+            &["slurm", slurm::IF_INSTALLED],
+        ]),
+    ),
+    (
+        "slurm",
+        "tests the commands for Slurm on a real one on this machine; takes names of tests",
+        Action::Function(slurm::test),
     ),
     (
         "tables",
@@ -144,7 +158,11 @@ fn perform(name: &str, words: &[String]) -> Result<()> {
             commands.iter().try_for_each(|arguments| cargo(&mut cargo_command(arguments)))
         }
         (Some(Action::Function(function)), words) => function(words),
-        (Some(Action::Commands(names)), []) => names.iter().try_for_each(|name| perform(name, &[])),
+        (Some(Action::Commands(commands)), []) => commands.iter().try_for_each(|command| {
+            let (name, words) = command.split_first().context("a command without a name")?;
+            let words: Vec<String> = words.iter().map(|&word| word.to_owned()).collect();
+            perform(name, &words)
+        }),
         _ => bail!("usage: cargo xtask COMMAND, one of:\n{}", list()),
     }
 }

@@ -248,6 +248,7 @@ fn config(scene: &Scene) -> WorkerConfig {
         isa: Isa::fastest(),
         give_up_after: None,
         time_limit: None,
+        idle_timeout: None,
     }
 }
 
@@ -297,6 +298,7 @@ async fn threads_have_bounds() {
             isa: Isa::fastest(),
             give_up_after: None,
             time_limit: None,
+            idle_timeout: None,
         };
         let error = run(config, pending()).await.unwrap_err();
         assert!(matches!(error, WorkerError::Threads { .. }), "{error}");

@@ -23,8 +23,14 @@ struct Recorder {
 
 impl Recorder {
     fn new() -> Self {
+        Self::leaving_after(None)
+    }
+
+    /// A worker with an idle timeout in seconds.
+    fn leaving_after(seconds: Option<u64>) -> Self {
+        let idle_timeout = seconds.map(Duration::from_secs);
         let identity = Identity { slots: 2, host: "host".to_owned(), process: 7, instance: 9 };
-        Self { state: State::new(identity), now: Duration::ZERO, effects: Vec::new() }
+        Self { state: State::new(identity, idle_timeout), now: Duration::ZERO, effects: Vec::new() }
     }
 
     fn attached() -> Self {
@@ -256,6 +262,43 @@ fn an_idle_worker_leaves_at_once() {
     let mut alone = Recorder::new();
     alone.event(Event::Drain);
     alone.expect(&[Effect::Leave]);
+}
+
+#[test]
+fn a_worker_without_work_leaves_after_its_idle_timeout() {
+    let mut worker = Recorder::leaving_after(Some(3));
+    // Without a coordinator nothing happens here, and that time does not count afterwards.
+    worker.tick_at(10.0);
+    worker.nothing_else();
+    worker.attach();
+    worker.tick_at(12.9);
+    worker.expect(&[HEARTBEAT]);
+    // A batch begins the time again, from its end on.
+    worker.batch(1);
+    worker.expect(&[compute(1, 1)]);
+    worker.tick_at(14.0);
+    worker.expect(&[HEARTBEAT]);
+    assert!(!worker.state.is_idle_too_long(Duration::from_secs(100)));
+    worker.now = Duration::from_secs(20);
+    worker.message(Response::Heartbeat(v1::Heartbeat {}));
+    worker.nothing_else();
+    worker.complete(1, 1);
+    worker.expect(&[answer(1)]);
+    worker.now = Duration::from_secs(22);
+    worker.message(Response::Heartbeat(v1::Heartbeat {}));
+    worker.tick_at(22.0);
+    worker.expect(&[HEARTBEAT]);
+    worker.tick_at(23.0);
+    worker.expect(&[DRAIN, Effect::Leave]);
+}
+
+#[test]
+fn a_worker_without_an_idle_timeout_stays() {
+    let mut worker = Recorder::attached();
+    worker.now = Duration::from_secs(1_000_000);
+    worker.message(Response::Heartbeat(v1::Heartbeat {}));
+    worker.tick_at(1_000_000.0);
+    worker.expect(&[HEARTBEAT]);
 }
 
 #[test]

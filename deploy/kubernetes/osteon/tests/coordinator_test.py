@@ -41,7 +41,7 @@ class Coordinator(unittest.TestCase):
             ({}, "--listen", "0.0.0.0:7000"),
             ({"listenAddress": "[::]"}, "--listen", "[::]:7000"),
             ({}, "--store", "/var/lib/osteon/store"),
-            ({}, "--metrics", "0.0.0.0:7100"),
+            ({}, "--metrics", "0.0.0.0:9464"),
         ]:
             found = coordinator({"coordinator": values})
             self.assertEqual(chart.argument(found, option), expected, values)
@@ -90,19 +90,19 @@ class Coordinator(unittest.TestCase):
     def test_services_lead_to_its_ports(self):
         found = chart.objects({"coordinator": {"service": {"port": 443, "type": "NodePort"}}})
         ports = {p["name"]: p["containerPort"] for p in chart.container(found["StatefulSet", "osteon-coordinator"])["ports"]}
-        self.assertEqual(ports, {"grpc": 7000, "metrics": 7100})
+        self.assertEqual(ports, {"grpc": 7000, "metrics": 9464})
         service = found["Service", "osteon-coordinator"]["spec"]
         self.assertEqual(service["type"], "NodePort")
         self.assertEqual([(p["port"], p["targetPort"]) for p in service["ports"]], [(443, "grpc")])
         service = found["Service", "osteon-coordinator-metrics"]["spec"]
         self.assertEqual(service["type"], "ClusterIP")
-        self.assertEqual([(p["port"], p["targetPort"]) for p in service["ports"]], [(7100, "metrics")])
+        self.assertEqual([(p["port"], p["targetPort"]) for p in service["ports"]], [(9464, "metrics")])
 
     def test_without_metrics_there_is_no_trace_of_them(self):
         found = chart.objects({"metrics": {"enabled": False}})
         self.assertNotIn(("Service", "osteon-coordinator-metrics"), found)
         self.assertIsNone(chart.argument(found["StatefulSet", "osteon-coordinator"], "--metrics"))
-        self.assertNotIn("7100", str(found))
+        self.assertNotIn("9464", str(found))
 
     def test_metrics_are_found_by_the_prometheus_operator(self):
         found = chart.objects({"metrics": {"serviceMonitor": {"enabled": True}}})

@@ -10,8 +10,6 @@ import custom_resources
 from machine import CONTAINER_USER, options_of
 
 NOT_OF_KUBERNETES = {"ServiceMonitor", "ScaledObject"}
-# Options that the chart passes and the program is about to get; the test below asks for their removal from here.
-EXPECTED_OPTIONS = {"--metrics"}
 
 
 def every():
@@ -126,16 +124,13 @@ class Variants(unittest.TestCase):
             with self.subTest(what):
                 self.assertEqual(chart.container(found)["command"], ["/usr/bin/osteon"])
                 given = {word for word in arguments if word.startswith("--")}
-                self.assertLessEqual(given, options_of(command) | EXPECTED_OPTIONS)
+                self.assertLessEqual(given, options_of(command))
             for probe in ("startupProbe", "readinessProbe", "livenessProbe"):
                 if probe in chart.container(found):
                     program, command, *arguments = chart.container(found)[probe]["exec"]["command"]
                     self.assertEqual(program, "/usr/bin/osteon")
                     given = {word for word in arguments if word.startswith("--")}
                     self.assertLessEqual(given, options_of(command))
-
-    def test_no_option_is_still_expected_that_the_program_has(self):
-        self.assertEqual(EXPECTED_OPTIONS & options_of("coordinator"), set())
 
     def test_selectors_find_their_pods_and_no_others(self):
         for variant, values in chart.variants().items():
