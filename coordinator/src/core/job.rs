@@ -163,6 +163,10 @@ pub(crate) struct FleetRate {
 
 /// Progress of a job.
 #[derive(Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a job has one, and it is computing most of the time"
+)]
 pub(crate) enum Stage {
     /// Its submission is being stored; no client has had an answer.
     StoringSubmission,

@@ -107,7 +107,7 @@ impl Branch {
         let known = known.filter(|known| known.is_of(outcomes));
         let statistics = known.map_or_else(
             || PointStatistics::from_outcomes(&specification.monte_carlo, &point, outcomes),
-            |known| known.statistics.clone(),
+            |known| known.statistics,
         );
         let cost = search.cost(specification, &statistics, &point, outcomes);
         let row = Evaluation {
@@ -121,7 +121,7 @@ impl Branch {
         };
         let set = search.set();
         let told = Arc::clone(outcomes);
-        search.tell(specification, row, statistics.clone(), Arc::clone(&told));
+        search.tell(specification, row, statistics, Arc::clone(&told));
         *evaluations += 1;
         Some(Assessment { set, outcomes: told, statistics, cost: Some(cost) })
     }

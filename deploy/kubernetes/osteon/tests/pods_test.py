@@ -16,7 +16,7 @@ import unittest
 import urllib.request
 
 import chart
-from machine import CONTAINER_USER, OSTEON, ROOT, commands_of_page, options_of, output
+from machine import CONTAINER_USER, OSTEON, ROOT, commands_of_page, output
 from services import Service, url_of, wait_for
 
 # The ports on which a coordinator listens in its pod; here it takes free ones.
@@ -117,8 +117,7 @@ class Pods(unittest.TestCase):
         # The pods' user must be able to pass.
         self.directory.chmod(0o755)
         self.cluster = Cluster(self.directory)
-        self.has_metrics = "--metrics" in options_of("coordinator")
-        values = {"metrics": {"enabled": self.has_metrics}, "worker": {"threads": 1}}
+        values = {"metrics": {"enabled": True}, "worker": {"threads": 1}}
         self.objects = chart.objects(values, **self.cluster.release)
 
     def start(self, kind, name, label, replaced):
