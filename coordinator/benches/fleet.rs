@@ -12,7 +12,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, VecDeque};
 use std::time::{Duration, Instant};
 
-use osteon_common::job::{Data, Group, JobSpecification, Sampling, Search, SearchMethod};
+use osteon_common::job::JobSpecification;
 use osteon_coordinator::config::{AUDIT_FRACTION, Config};
 use osteon_coordinator::core::completion::Completed;
 use osteon_coordinator::core::effect::{Effect, Record};
@@ -24,6 +24,10 @@ use osteon_coordinator::core::state::State;
 #[path = "../tests/fake/mod.rs"]
 #[expect(dead_code, reason = "each benchmark uses a part of it")]
 mod fake;
+#[path = "../tests/fake/grouped.rs"]
+mod grouped;
+
+use grouped::{OF_GROUP, grouped};
 
 /// Slots of each worker.
 const SLOTS: u32 = 16;
@@ -35,8 +39,6 @@ const HEARTBEAT: Duration = Duration::from_secs(2);
 const LATENCY: Duration = Duration::from_micros(100);
 /// Time until a record of groups is durable; those of propagations are so at once.
 const SYNC: Duration = Duration::from_millis(4);
-/// Realizations of an evaluation of each group.
-const OF_GROUP: u64 = 1024;
 /// Longest simulated time of a job.
 const LIMIT: Duration = Duration::from_secs(3600);
 
@@ -178,20 +180,6 @@ fn measured(row: &Row) -> String {
         micros(fleet.core) / realizations as f64,
         fleet.longest.as_secs_f64() * 1e3,
     )
-}
-
-/// An identification of so many groups of twenty velocities, by Newton's method.
-fn grouped(groups: usize) -> JobSpecification {
-    let group = |number: usize| {
-        let mean = 3700.0 + 400.0 * (number as f64 / groups as f64);
-        let velocities = (0..20).map(|k| mean * (1.0 + 0.004 * (f64::from(k) - 9.5))).collect();
-        Group::new(format!("group {number}"), velocities)
-    };
-    let mut job = fake::identification(OF_GROUP, 60, 3);
-    job.search = Search { max_evaluations: 60, ..Search::by(SearchMethod::Newton) };
-    job.monte_carlo.sampling = Sampling::Sobol;
-    job.data = Some(Data::from_groups((0..groups).map(group).collect()));
-    job
 }
 
 impl Fleet {

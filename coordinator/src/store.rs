@@ -75,12 +75,12 @@ pub struct PartRecord {
     /// The point of the evaluation.
     pub point: Point,
     /// The results.
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<PartPiece>,
 }
 
 /// Results of consecutive indices that one worker gave.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Piece {
+pub struct PartPiece {
     /// The first index.
     pub first: u64,
     /// The worker.

@@ -4,6 +4,7 @@ mod chaos;
 mod deny;
 mod deploy;
 mod digests;
+mod fleet;
 mod metrics;
 mod python;
 mod random;
@@ -119,6 +120,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(chaos::storm),
     ),
     ("bench", "measures what docs/performance.md states", Action::Cargo(BENCH)),
+    (
+        "bench-fleet",
+        "measures jobs on fleets of simulated workers; --help lists the options",
+        Action::Function(fleet::bench),
+    ),
     ("docs", "the documentation of all crates", Action::Cargo(&[DOCS])),
 ];
 
@@ -168,7 +174,7 @@ fn perform(name: &str, words: &[String]) -> Result<()> {
 }
 
 fn list() -> String {
-    TASKS.iter().map(|(name, what, _)| format!("  {name:8} {what}\n")).collect()
+    TASKS.iter().map(|(name, what, _)| format!("  {name:11} {what}\n")).collect()
 }
 
 /// Creates a cargo command with these arguments, at the root of the workspace.

@@ -13,7 +13,7 @@ use crate::core::evaluation::{Audit, PendingEvaluation};
 use crate::core::ids::JobId;
 use crate::core::indices::Indices;
 use crate::core::worker_name::WorkerName;
-use crate::store::{PartRecord, Piece};
+use crate::store::{PartPiece, PartRecord};
 
 /// Results are saved when they, or their evaluation, are this old.
 pub(crate) const SAVE_AFTER: Duration = Duration::from_millis(1500);
@@ -32,7 +32,7 @@ pub(crate) fn point_bits(point: &Point) -> PointBits {
 
 /// Results that an earlier coordinator saved for a job, by the points of their evaluations.
 #[derive(Debug, Default)]
-pub(crate) struct SavedParts(BTreeMap<PointBits, Vec<Piece>>);
+pub(crate) struct SavedParts(BTreeMap<PointBits, Vec<PartPiece>>);
 
 impl SavedParts {
     /// Returns the results in these records, without those of the workers for which `banned` is true.
@@ -57,7 +57,7 @@ impl SavedParts {
             return;
         };
         let number = evaluation.number;
-        for Piece { first, by, results } in pieces {
+        for PartPiece { first, by, results } in pieces {
             let indices = Indices { first, count: results.len() as u64 };
             if indices.end() > evaluation.realizations() {
                 continue;
@@ -84,7 +84,7 @@ pub(crate) fn take_unsaved(evaluation: &mut PendingEvaluation, job: JobId) -> Op
     if evaluation.unsaved.is_empty() || !evaluation.disputes.is_empty() {
         return None;
     }
-    let mut pieces: Vec<Piece> = Vec::new();
+    let mut pieces: Vec<PartPiece> = Vec::new();
     for indices in std::mem::take(&mut evaluation.unsaved) {
         for index in indices.first..indices.end() {
             let Some((result, by)) = evaluation.result(index) else {
@@ -98,7 +98,7 @@ pub(crate) fn take_unsaved(evaluation: &mut PendingEvaluation, job: JobId) -> Op
                 {
                     last.results.push(result);
                 }
-                _ => pieces.push(Piece { first: index, by: by.clone(), results: vec![result] }),
+                _ => pieces.push(PartPiece { first: index, by: by.clone(), results: vec![result] }),
             }
         }
     }

@@ -41,7 +41,7 @@ use columns::{
     JobColumns, ban_checksum, end_checksum, evaluation, evaluation_checksum, job_checksum,
     nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
 };
-use job_row::{job_columns, job_record};
+use job_row::{damaged_end, job_columns, job_record};
 
 /// The header field of the file that holds the highest identifier of a deleted job. It is part of
 /// the database, so it changes in one transaction with the tables.
@@ -487,19 +487,6 @@ fn never_again(connection: &Connection, last: u64) -> rusqlite::Result<()> {
     let last = i32::try_from(last).unwrap_or(i32::MAX);
     connection.pragma_update(None, LAST_DELETED_JOB, last)?;
     connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
-}
-
-/// Returns the end that is shown for a job whose end is damaged: one such row must not keep all
-/// others from being served. Nothing is written, because a copy of the file may have the right end.
-fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
-    tracing::error!(%error, "a job is shown as failed; the others are served");
-    let ending = Ending {
-        status: Status::Failed,
-        failure: Some(JobFailure::Store),
-        reason: Some(error.to_string()),
-    };
-    let program = Program { version: "unknown".to_owned(), numerics: 0, commit: None };
-    EndRecord::new(record.job, ending, program, record.accepted, 0, None)
 }
 
 #[cfg(test)]

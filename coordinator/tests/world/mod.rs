@@ -161,18 +161,7 @@ impl World {
             random = fake::mix(random);
             random % below
         };
-        let config = Config {
-            heartbeat: Duration::from_millis(200),
-            expiry: Duration::from_secs(1),
-            active_jobs_max: 1 + draw(2) as usize,
-            batch_target: Duration::from_millis(10 + draw(200)),
-            store_retry: Duration::from_millis(300),
-            audit_fraction: [0.0, 0.01, 0.3, 1.0][draw(4) as usize],
-            ahead: draw(4) > 0,
-            completed_aside_min: [1, 20, u64::MAX][(seed % 3) as usize],
-            speculation: draw(3) > 0,
-            ..Config::default()
-        };
+        let config = some_config(seed, &mut draw);
         let clients = clients::some(seed, &mut draw);
         let (workers, restarts) = (1 + draw(4), draw(3));
         let restarts: Vec<u64> = (0..restarts).map(|_| draw(3000)).collect();
@@ -460,4 +449,20 @@ fn key(work: &Work) -> (u64, u64, u64, u32) {
 
 fn point_key(point: &Point) -> u64 {
     point.0.iter().fold(0, |key, x| fake::mix(key ^ x.to_bits()))
+}
+
+/// Returns the settings of a coordinator whose times are short.
+fn some_config(seed: u64, draw: &mut impl FnMut(u64) -> u64) -> Config {
+    Config {
+        heartbeat: Duration::from_millis(200),
+        expiry: Duration::from_secs(1),
+        active_jobs_max: 1 + draw(2) as usize,
+        batch_target: Duration::from_millis(10 + draw(200)),
+        store_retry: Duration::from_millis(300),
+        audit_fraction: [0.0, 0.01, 0.3, 1.0][draw(4) as usize],
+        ahead: draw(4) > 0,
+        completed_aside_min: [1, 20, u64::MAX][(seed % 3) as usize],
+        speculation: draw(3) > 0,
+        ..Config::default()
+    }
 }

@@ -3,13 +3,16 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use osteon_common::results::{JobFailure, Status};
+use osteon_common::version::Program;
 use osteon_proto::{specification, v1};
+use osteon_search::Ending;
 use prost::Message as _;
 use rusqlite::Row;
 
 use super::columns::{JobColumns, job_checksum, nanoseconds};
 use crate::core::ids::JobId;
-use crate::store::JobRecord;
+use crate::store::{EndRecord, JobRecord, StoreError};
 
 /// Returns the job of a row, and its identifier; `None` if the row is damaged.
 pub(super) fn job_record(row: &Row<'_>) -> rusqlite::Result<(JobId, Option<JobRecord>)> {
@@ -56,4 +59,17 @@ pub(super) fn job_columns<'a>(record: &'a JobRecord, encoded: &'a [u8]) -> JobCo
         priority: record.priority,
         name: &record.name,
     }
+}
+
+/// Returns the end that is shown for a job whose end is damaged: one such row must not keep all
+/// others from being served. Nothing is written, because a copy of the file may have the right end.
+pub(super) fn damaged_end(record: &JobRecord, error: &StoreError) -> EndRecord {
+    tracing::error!(%error, "a job is shown as failed; the others are served");
+    let ending = Ending {
+        status: Status::Failed,
+        failure: Some(JobFailure::Store),
+        reason: Some(error.to_string()),
+    };
+    let program = Program { version: "unknown".to_owned(), numerics: 0, commit: None };
+    EndRecord::new(record.job, ending, program, record.accepted, 0, None)
 }

@@ -8,7 +8,7 @@ use rusqlite::{Connection, params};
 
 use super::columns::{checksum, pack_point, pack_worker, unpack, unpack_worker};
 use crate::core::ids::JobId;
-use crate::store::{PartRecord, Piece};
+use crate::store::{PartPiece, PartRecord};
 
 /// The table. Earlier versions had none, and a file without it is one without parts.
 pub(super) const TABLE: &str = "
@@ -72,7 +72,7 @@ pub(super) fn of_job(connection: &Connection, job: JobId) -> rusqlite::Result<Ve
         let Some(((point, by), results)) = unpacked else {
             continue;
         };
-        let piece = Piece { first, by, results };
+        let piece = PartPiece { first, by, results };
         match parts.last_mut() {
             Some(last) if osteon_search::same_point(&last.point, &point) => last.pieces.push(piece),
             _ => parts.push(PartRecord { job, point, pieces: vec![piece] }),

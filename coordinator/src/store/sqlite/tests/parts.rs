@@ -3,7 +3,7 @@
 use osteon_common::outcome::RealizationResult;
 
 use super::*;
-use crate::store::{PartRecord, Piece};
+use crate::store::{PartPiece, PartRecord};
 
 /// A part of the evaluation with this number, in two pieces.
 pub(super) fn part(job: u64, number: u64) -> PartRecord {
@@ -11,7 +11,7 @@ pub(super) fn part(job: u64, number: u64) -> PartRecord {
         outcome: if k == 1 { Err(FailureKind::NoArrival) } else { Ok(3900.0 + f64::from(k)) },
         estimated_error: if k == 1 { 0.0 } else { 1e-5 * f64::from(k) },
     };
-    let piece = |first: u64, process| Piece {
+    let piece = |first: u64, process| PartPiece {
         first,
         by: WorkerName::new("a node", process, 1 << 63),
         results: (0..3).map(result).collect(),
