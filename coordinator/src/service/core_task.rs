@@ -17,7 +17,7 @@ use crate::core::snapshot;
 use crate::core::state::State;
 use crate::service::failing::{ComponentFailure, FailureReporter};
 use crate::service::meter::{CoreReport, Meter};
-use crate::service::outbound::{self, NotReading, Outbound};
+use crate::service::outbound::{self, EvaluationMessages, NotReading, Outbound};
 use crate::store::thread::StoreCommand;
 
 /// A message to the core task.
@@ -65,6 +65,7 @@ pub(crate) struct Core {
     /// Newest snapshots of the jobs that are being watched.
     watching: BTreeMap<JobId, watch::Sender<v1::JobSnapshot>>,
     outbound: BTreeMap<WorkerId, Outbound>,
+    evaluations: EvaluationMessages,
     on_stop: Option<oneshot::Sender<()>>,
     stopped: bool,
     failing: FailureReporter,
@@ -92,6 +93,7 @@ impl Core {
             waiting: BTreeMap::new(),
             watching: BTreeMap::new(),
             outbound: BTreeMap::new(),
+            evaluations: EvaluationMessages::default(),
             on_stop: None,
             stopped: false,
             failing,
@@ -178,7 +180,12 @@ impl Core {
                     self.send(worker, welcome, followups);
                 }
                 Effect::Send { worker, batch, work } => {
-                    self.queue(worker, followups, |outbound| outbound.send_batch(batch, &work));
+                    // Apart, because `queue` borrows the rest.
+                    let mut evaluations = std::mem::take(&mut self.evaluations);
+                    self.queue(worker, followups, |outbound| {
+                        outbound.send_batch(batch, &work, &mut evaluations)
+                    });
+                    self.evaluations = evaluations;
                 }
                 Effect::Revoke { worker, batch } => {
                     self.send(worker, outbound::revoke(batch), followups);

@@ -56,12 +56,34 @@ impl Outbound {
     ///
     /// # Errors
     /// As [`Outbound::send`].
-    pub(crate) fn send_batch(&mut self, id: BatchId, work: &Work) -> Result<(), NotReading> {
+    pub(crate) fn send_batch(
+        &mut self,
+        id: BatchId,
+        work: &Work,
+        evaluations: &mut EvaluationMessages,
+    ) -> Result<(), NotReading> {
         if self.announced.get(work.evaluation.id).is_none() {
-            self.send(Ok(evaluation(&work.evaluation)))?;
+            self.send(Ok(evaluations.of(&work.evaluation)))?;
             self.announced.announce(work.evaluation.id, ());
         }
         self.send(Ok(batch(id, work)))
+    }
+}
+
+/// Messages of the last evaluations: each goes to many workers, and takes much longer to make than to
+/// copy.
+#[derive(Debug, Default)]
+pub(crate) struct EvaluationMessages(Announced<AttachResponse>);
+
+impl EvaluationMessages {
+    /// Returns the message that announces an evaluation.
+    fn of(&mut self, input: &EvaluationInput) -> AttachResponse {
+        if let Some(made) = self.0.get(input.id) {
+            return *made;
+        }
+        let made = evaluation(input);
+        self.0.announce(input.id, made);
+        made
     }
 }
 
@@ -162,8 +184,9 @@ mod tests {
         let (sender, mut stream) = mpsc::channel(2);
         let (mut outbound, _closed) = Outbound::new(sender);
         let (mut received, mut announced) = (Received::default(), Vec::new());
+        let mut evaluations = EvaluationMessages::default();
         for id in ids {
-            outbound.send_batch(BatchId(9), &work(id)).unwrap();
+            outbound.send_batch(BatchId(9), &work(id), &mut evaluations).unwrap();
             while let Ok(message) = stream.try_recv() {
                 match message.unwrap().message {
                     Some(Response::Evaluation(message)) => {
@@ -199,9 +222,10 @@ mod tests {
         let (mut outbound, _closed) = Outbound::new(sender);
         outbound.send(Ok(heartbeat())).unwrap();
         outbound.send(Ok(heartbeat())).unwrap();
-        assert!(outbound.send_batch(BatchId(1), &work(5)).is_err());
+        let mut evaluations = EvaluationMessages::default();
+        assert!(outbound.send_batch(BatchId(1), &work(5), &mut evaluations).is_err());
         while stream.try_recv().is_ok() {}
-        outbound.send_batch(BatchId(2), &work(5)).unwrap();
+        outbound.send_batch(BatchId(2), &work(5), &mut evaluations).unwrap();
         let first = stream.try_recv().unwrap().unwrap();
         assert_eq!(first, evaluation(&work(5).evaluation));
     }
