@@ -33,6 +33,7 @@ fn run(state: &mut State, store: &mut SqliteStore, request: Request) {
             Effect::Send { worker, batch, work } => {
                 Event::Answered { worker, batch, solved: fake::solved(&work), elapsed_s: 0.01 }
             }
+            Effect::Complete(completion) => Event::Completed(completion.run()),
             Effect::Store(record) => fake::written(store, &record),
             _ => continue,
         };

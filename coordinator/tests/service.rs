@@ -14,8 +14,7 @@ use osteon_coordinator::core::worker_name::WorkerName;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::store::{
-    BanRecord, Changes, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store, StoreError,
-    StoredJob,
+    BanRecord, Changes, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
 };
 use osteon_coordinator::{ComponentFailure, Config, Coordinator, Listener, start};
 use osteon_proto::announced::Received;
@@ -359,14 +358,6 @@ impl Store for BrokenStore {
         assert!(!self.dies, "a store that this test breaks");
         let error = std::io::Error::other("the disk is full");
         Err(StoreError::Directory { path: "store".into(), error })
-    }
-
-    fn put_part(&mut self, _: &PartRecord) -> Result<(), StoreError> {
-        Ok(())
-    }
-
-    fn parts(&mut self, _: JobId) -> Result<Vec<PartRecord>, StoreError> {
-        Ok(Vec::new())
     }
 
     fn finish_job(&mut self, end: &EndRecord, summary: &Summary) -> Result<(), StoreError> {

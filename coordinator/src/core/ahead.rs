@@ -26,7 +26,7 @@ pub(crate) struct Ahead {
     /// Number of the first part that has had no branch yet.
     pub(crate) next_part: u64,
     /// Complete evaluations, by their points.
-    prepared: BTreeMap<PointBits, Prepared>,
+    prepared: BTreeMap<PointBits, PreparedEvaluation>,
 }
 
 /// A branch, and the evaluation of its pending point.
@@ -42,7 +42,7 @@ pub(crate) struct FollowedBranch {
 
 /// A complete evaluation that the search has not asked for yet.
 #[derive(Debug, Clone)]
-pub(crate) struct Prepared {
+pub(crate) struct PreparedEvaluation {
     /// The part of the search that will ask for it; `None` if several will.
     pub(crate) part: Option<u64>,
     pub(crate) outcomes: Arc<[Outcome]>,
@@ -82,7 +82,7 @@ impl Ahead {
     }
 
     /// Returns the complete evaluation of a point.
-    pub(crate) fn prepared(&self, point: &Point) -> Option<&Prepared> {
+    pub(crate) fn prepared(&self, point: &Point) -> Option<&PreparedEvaluation> {
         self.prepared.get(&point_bits(point))
     }
 
@@ -94,12 +94,12 @@ impl Ahead {
     }
 
     /// Returns the complete evaluations.
-    pub(crate) fn all_prepared(&self) -> impl Iterator<Item = &Prepared> {
+    pub(crate) fn all_prepared(&self) -> impl Iterator<Item = &PreparedEvaluation> {
         self.prepared.values()
     }
 
     /// Keeps the complete evaluation of a point.
-    pub(crate) fn prepare(&mut self, point: &Point, prepared: Prepared) {
+    pub(crate) fn prepare(&mut self, point: &Point, prepared: PreparedEvaluation) {
         self.prepared.insert(point_bits(point), prepared);
     }
 
@@ -120,7 +120,8 @@ impl Ahead {
         let (point, part) = (complete.point, Some(part));
         let workers = complete.workers.iter().cloned().collect();
         let unsaved = (!complete.unsaved.is_empty()).then(|| (Box::new(complete), now));
-        let prepared = Prepared { part, outcomes, estimated_error, workers, assessment, unsaved };
+        let prepared =
+            PreparedEvaluation { part, outcomes, estimated_error, workers, assessment, unsaved };
         self.prepare(&point, prepared);
         true
     }
@@ -144,13 +145,13 @@ impl Ahead {
 
     /// Takes the complete evaluation of a point that the search asks for in part number `part`. It stays
     /// if it was not computed for this part alone.
-    pub(crate) fn take_prepared(&mut self, point: &Point, part: u64) -> Option<Prepared> {
+    pub(crate) fn take_prepared(&mut self, point: &Point, part: u64) -> Option<PreparedEvaluation> {
         let prepared = self.prepared.get_mut(&point_bits(point))?;
         if prepared.part == Some(part) {
             return self.prepared.remove(&point_bits(point));
         }
         prepared.part = None;
-        Some(Prepared { unsaved: None, ..prepared.clone() })
+        Some(PreparedEvaluation { unsaved: None, ..prepared.clone() })
     }
 
     /// Drops the complete evaluations that belong only to parts before `part`.

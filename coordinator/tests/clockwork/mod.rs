@@ -7,6 +7,7 @@ use std::time::Duration;
 use osteon_common::job::JobSpecification;
 use osteon_common::results::JobResult;
 use osteon_coordinator::config::Config;
+use osteon_coordinator::core::completion::Completion;
 use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::{Event, Hello, Request};
 use osteon_coordinator::core::ids::{BatchId, JobId, ReplyId, WorkerId};
@@ -40,6 +41,7 @@ enum Occurrence {
     Revoked(WorkerId, BatchId),
     /// A thread of a worker finishes a realization of a batch.
     Realized(WorkerId, BatchId),
+    Complete(Completion),
     Write(Record),
 }
 
@@ -207,6 +209,7 @@ impl Clockwork {
                 self.realized(worker, batch);
                 self.begin(worker);
             }
+            Occurrence::Complete(completion) => self.react(Event::Completed(completion.run())),
             Occurrence::Write(record) => {
                 let event = fake::written(&mut self.store, &record);
                 if let Record::End { end, .. } = record {
@@ -264,6 +267,9 @@ impl Clockwork {
                 }
                 Effect::Revoke { worker, batch } => {
                     self.after(MESSAGE, Occurrence::Revoked(worker, batch));
+                }
+                Effect::Complete(completion) => {
+                    self.after(RECORD, Occurrence::Complete(completion))
                 }
                 Effect::Store(record) => self.after(RECORD, Occurrence::Write(record)),
                 Effect::Close { worker, reason } => panic!("{worker} is closed: {reason}"),

@@ -22,15 +22,17 @@ pub(super) const TABLE: &str = "
         fingerprint TEXT NOT NULL,       -- of the numerics
         checksum BLOB NOT NULL
     );
-    CREATE INDEX IF NOT EXISTS part_of_job ON part (job, point);
+    CREATE UNIQUE INDEX IF NOT EXISTS part_place ON part (job, point, first, worker);
 ";
 
 /// Size of a result in a blob, bytes: its code, its velocity and its estimated error.
 const RESULT_BYTES: usize = 17;
 
-/// Adds the pieces of a part, in one transaction with whatever is open.
+/// Adds the pieces of a part, in one transaction with whatever is open. A piece that begins like one
+/// of the same worker takes its place: it has been saved again.
 pub(super) fn put(connection: &Connection, record: &PartRecord) -> rusqlite::Result<()> {
-    let sql = "INSERT INTO part (job, point, worker, first, results, fingerprint, checksum)
+    let sql =
+        "INSERT OR REPLACE INTO part (job, point, worker, first, results, fingerprint, checksum)
                VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
     let mut insert = connection.prepare(sql)?;
     let point = pack_point(record.point);

@@ -15,7 +15,7 @@ use osteon_common::parameters::Point;
 use osteon_search::same_point;
 
 use super::batches;
-use crate::core::ahead::{FollowedBranch, Prepared};
+use crate::core::ahead::{FollowedBranch, PreparedEvaluation};
 use crate::core::batch::Assignment;
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{BatchId, JobId};
@@ -64,7 +64,7 @@ pub(crate) fn keep_if_awaited(job: &mut Job, record: &EvaluationRecord) {
             && it.branch.point().is_some_and(|at| same_point(&at, &record.point))
     };
     if job.ahead.branches.iter().any(waits) {
-        let prepared = Prepared {
+        let prepared = PreparedEvaluation {
             part: None,
             outcomes: Arc::clone(&record.outcomes),
             estimated_error: record.estimated_error,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use osteon_common::results::Status;
 use osteon_common::version::Program;
 
-use crate::core::ahead::Prepared;
+use crate::core::ahead::PreparedEvaluation;
 use crate::core::completion::{Completed, Completion};
 use crate::core::effect::{Effect, Record};
 use crate::core::evaluation::PendingEvaluation;
@@ -242,7 +242,7 @@ fn store_prepared(turn: &mut Turn, id: JobId) -> bool {
         && realizations < realizations_max
         && let Some(prepared) = job.ahead.take_prepared(&point, after.part())
     {
-        let Prepared { outcomes, estimated_error, workers, assessment, .. } = prepared;
+        let PreparedEvaluation { outcomes, estimated_error, workers, assessment, .. } = prepared;
         realizations += outcomes.len();
         let number = after.evaluations();
         if let Some(assessment) = assessment {
