@@ -1,4 +1,4 @@
-//! What is measured.
+//! The command line, and the rows of the table that it asks for.
 
 use std::time::Duration;
 
@@ -65,7 +65,7 @@ pub(crate) struct Row {
     pub(crate) disturbance: Option<Disturbance>,
 }
 
-/// What happens when half of the realizations are answered.
+/// A fault that the benchmark injects as soon as half of the realizations are answered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Disturbance {
     /// This number of workers behaves like this from then on.

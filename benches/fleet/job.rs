@@ -54,7 +54,7 @@ impl Job {
     }
 }
 
-/// What an ended job left.
+/// The fetched result of an ended job, as far as the table needs it.
 #[derive(Debug)]
 pub(crate) struct Left {
     pub(crate) digest: String,

@@ -22,7 +22,7 @@ pub(crate) const HEADER: &str = "\
 | workers | half way | job | each | ideal | measured | of ideal | realizations/s | batches | coordinator's CPU | per realization | its memory | fleet's CPU | computed again | digest |
 |--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|";
 
-/// What a fleet took for a job.
+/// The measurements of one row: times, work and memory of a fleet and its coordinator for one job.
 #[derive(Debug)]
 pub(crate) struct Measured {
     row: Row,

@@ -16,7 +16,8 @@ pub(crate) struct CoordinatorProcess {
     folder: TempDir,
     url: String,
     running: Option<Service>,
-    /// Of the processes that were killed: processor time, s, and largest memory, bytes.
+    /// Processor time (s, summed) and peak memory (bytes, the largest) of the coordinator processes that
+    /// [`CoordinatorProcess::restart`] has killed so far.
     before: (f64, u64),
 }
 

@@ -57,7 +57,7 @@ pub(crate) struct Fleet {
     _tasks: JoinSet<()>,
 }
 
-/// What the workers of a fleet have in common.
+/// Settings, orders and counts that all workers of a fleet share.
 struct Shared {
     endpoint: Endpoint,
     slots: u32,

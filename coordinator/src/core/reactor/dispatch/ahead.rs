@@ -16,9 +16,8 @@ use osteon_search::same_point;
 
 use super::batches;
 use crate::core::ahead::{FollowedBranch, PreparedEvaluation};
-use crate::core::batch::Assignment;
 use crate::core::evaluation::PendingEvaluation;
-use crate::core::ids::{BatchId, JobId};
+use crate::core::ids::JobId;
 use crate::core::job::{Job, Stage};
 use crate::core::reactor::turn::Turn;
 use crate::core::worker_name::WorkerName;
@@ -31,14 +30,10 @@ pub(crate) fn refresh(turn: &mut Turn, id: JobId) {
             return;
         }
         job.ahead.next_part = job.ahead.next_part.max(job.search.part() + 1);
-        let mut idle = job.ahead.branches.iter().filter(|it| it.evaluation.is_none());
-        if let Some(part) = idle.next().map(|it| it.part) {
-            let waits = |it: &FollowedBranch| it.part >= part && it.evaluation.is_none();
-            let parts = job.ahead.branches.iter().filter(|it| waits(it)).map(|it| it.part);
-            let parts: Vec<u64> = parts.collect();
-            if parts.into_iter().any(|part| begin(turn, id, part)) {
-                return;
-            }
+        let idle = job.ahead.branches.iter().filter(|it| it.evaluation.is_none());
+        let idle: Vec<u64> = idle.map(|it| it.part).collect();
+        if idle.into_iter().any(|part| begin(turn, id, part)) {
+            return;
         }
         let Some(job) = turn.state.jobs.get_mut(&id) else {
             return;
@@ -110,7 +105,7 @@ pub(crate) fn drop_before(turn: &mut Turn, id: JobId, part: u64) {
     job.ahead.drop_before(part);
     let passed = job.ahead.branches.extract_if(.., |it| it.part < part);
     let gone: Vec<u64> = passed.filter_map(|it| Some(it.evaluation?.attempt)).collect();
-    revoke(turn, id, &gone);
+    batches::revoke_attempts(turn, id, &gone);
 }
 
 /// Drops the evaluation of the last branch of the job that has most of them; returns whether there is
@@ -125,7 +120,7 @@ pub(crate) fn drop_last(turn: &mut Turn) -> bool {
     };
     let branches = turn.state.jobs.get_mut(&id).map(|job| &mut job.ahead.branches);
     let last = branches.into_iter().flatten().rev().find_map(|it| it.evaluation.take());
-    revoke(turn, id, &Vec::from_iter(last.map(|evaluation| evaluation.attempt)));
+    batches::revoke_attempts(turn, id, &Vec::from_iter(last.map(|evaluation| evaluation.attempt)));
     true
 }
 
@@ -136,7 +131,7 @@ pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     };
     let gone: Vec<u64> = job.ahead.evaluations().map(|it| it.attempt).collect();
     job.ahead.forget(name);
-    revoke(turn, id, &gone);
+    batches::revoke_attempts(turn, id, &gone);
 }
 
 /// Drops everything.
@@ -146,7 +141,7 @@ pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
     };
     let ahead = std::mem::take(&mut job.ahead);
     let gone: Vec<u64> = ahead.evaluations().map(|it| it.attempt).collect();
-    revoke(turn, id, &gone);
+    batches::revoke_attempts(turn, id, &gone);
 }
 
 /// Returns the number of realizations that the known parts of a search will need at least, beyond
@@ -208,19 +203,5 @@ fn begin(turn: &mut Turn, id: JobId, part: u64) -> bool {
         if !job.ahead.take_in(part, turn.now) {
             return waits;
         }
-    }
-}
-
-/// Revokes the batches of these attempts at evaluations.
-fn revoke(turn: &mut Turn, id: JobId, gone: &[u64]) {
-    if gone.is_empty() {
-        return;
-    }
-    let of_gone =
-        |assignment: &Assignment| assignment.job == id && gone.contains(&assignment.attempt);
-    let held = turn.state.batches.iter().filter(|(_, batch)| of_gone(&batch.assignment));
-    let held: Vec<BatchId> = held.map(|(id, _)| *id).collect();
-    for batch in held {
-        batches::revoke(turn, batch);
     }
 }

@@ -87,6 +87,20 @@ pub(crate) fn revoke_all(turn: &mut Turn, job: JobId) {
     }
 }
 
+/// Revokes the batches of a job that belong to these attempts at evaluations.
+pub(crate) fn revoke_attempts(turn: &mut Turn, job: JobId, attempts: &[u64]) {
+    if attempts.is_empty() {
+        return;
+    }
+    let is_of =
+        |assignment: &Assignment| assignment.job == job && attempts.contains(&assignment.attempt);
+    let held = turn.state.batches.iter().filter(|(_, batch)| is_of(&batch.assignment));
+    let held: Vec<BatchId> = held.map(|(id, _)| *id).collect();
+    for batch in held {
+        revoke(turn, batch);
+    }
+}
+
 /// Returns the indices of a lost worker's batch to the queue, unless a duplicate of it is still
 /// out.
 pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &LostWorker) {

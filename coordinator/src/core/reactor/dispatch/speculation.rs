@@ -160,16 +160,7 @@ fn retain(turn: &mut Turn, id: JobId, stays: impl Fn(&PendingEvaluation) -> bool
         .extract_if(.., |it| goes(it))
         .map(|gone| gone.attempt)
         .collect();
-    if gone.is_empty() {
-        return;
-    }
-    let of_gone =
-        |assignment: &Assignment| assignment.job == id && gone.contains(&assignment.attempt);
-    let held = turn.state.batches.iter().filter(|(_, batch)| of_gone(&batch.assignment));
-    let held: Vec<BatchId> = held.map(|(id, _)| *id).collect();
-    for batch in held {
-        batches::revoke(turn, batch);
-    }
+    batches::revoke_attempts(turn, id, &gone);
 }
 
 impl Speculation {

@@ -41,7 +41,7 @@ fn bone(effect: &Effect) -> Option<Event> {
     Some(Event::Answered { worker, batch, solved, elapsed_s: 0.1 })
 }
 
-/// What a job left in the store.
+/// The evaluations that a job stored, how it ended, and its digest.
 #[derive(Debug, PartialEq)]
 struct Left {
     evaluations: Vec<EvaluationRecord>,
