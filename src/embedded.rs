@@ -76,7 +76,10 @@ impl Embedded {
     }
 
     /// Ends and reaps the workers, then ends the coordinator.
-    pub(crate) async fn end(self) {
+    pub(crate) async fn end(mut self) {
+        // The coordinator first: it would report workers that are ended with batches as lost.
+        self.workers.mute();
+        self.coordinator.drain().await;
         self.workers.end().await;
         self.coordinator.shutdown().await;
     }

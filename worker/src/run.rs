@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX};
 use osteon_proto::credentials::Credentials;
-use osteon_proto::endpoint::{self, ConnectError, Endpoint};
+use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::identity;
 use osteon_proto::tls_failure::TlsFailure;
 use osteon_proto::v1::attach_request::Message as Request;
@@ -176,10 +176,15 @@ impl Worker {
     ) -> Result<End, WorkerError> {
         let (outbox, requests) = mpsc::channel(OUTBOX_MAX);
         let (endpoint, credentials) = (self.endpoint.clone(), self.credentials.clone());
-        let hello = self.state.attach();
-        let opened = tokio::select! {
+        let connected = tokio::select! {
             () = leave.as_mut() => return Ok(End::Left),
-            opened = open(&endpoint, &credentials, hello, &outbox, requests) => opened,
+            connected = connect(&endpoint, &credentials) => connected,
+        };
+        let hello = self.state.attach();
+        let opened = match connected {
+            // From the hello on, the coordinator may send batches: whoever leaves must drain.
+            Ok(channel) => open(channel, hello, &outbox, requests).await,
+            Err(error) => Err(error),
         };
         let mut responses = match opened {
             Ok(responses) => {
@@ -331,20 +336,23 @@ enum OpenError {
     Status(Status),
 }
 
-/// Connects and sends the hello.
+async fn connect(endpoint: &Endpoint, credentials: &Credentials) -> Result<Connection, OpenError> {
+    let limit = Duration::from_secs(ATTACH_S_MAX);
+    let connected = endpoint::connect_with(endpoint, credentials, limit).await;
+    connected.map_err(|error| match error {
+        ConnectError::Tls { failure, .. } => OpenError::Distrust(failure),
+        other => OpenError::Unreachable(other.to_string()),
+    })
+}
+
+/// Sends the hello.
 async fn open(
-    endpoint: &Endpoint,
-    credentials: &Credentials,
+    channel: Connection,
     hello: Request,
     outbox: &mpsc::Sender<AttachRequest>,
     requests: mpsc::Receiver<AttachRequest>,
 ) -> Result<Streaming<AttachResponse>, OpenError> {
     let limit = Duration::from_secs(ATTACH_S_MAX);
-    let connected = endpoint::connect_with(endpoint, credentials, limit).await;
-    let channel = connected.map_err(|error| match error {
-        ConnectError::Tls { failure, .. } => OpenError::Distrust(failure),
-        other => OpenError::Unreachable(other.to_string()),
-    })?;
     let unanswered = || OpenError::Unreachable("the coordinator does not answer".to_owned());
     // The outbox is empty, so the hello always fits.
     outbox.try_send(AttachRequest { message: Some(hello) }).map_err(|_| unanswered())?;

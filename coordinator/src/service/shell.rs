@@ -91,6 +91,7 @@ pub struct Coordinator {
     store: JoinHandle<()>,
     metrics: Option<MetricsTask>,
     shutdown_timeout: Duration,
+    drained: bool,
 }
 
 /// The task that serves metrics; it ends when this is dropped.
@@ -176,6 +177,7 @@ pub async fn start(
         store,
         metrics,
         shutdown_timeout: config.shutdown_timeout,
+        drained: false,
     })
 }
 
@@ -216,10 +218,13 @@ impl Coordinator {
         self.failing.first()
     }
 
-    /// Stops: sends no new batch, closes every stream and stores everything complete. Waits for
-    /// that at most [`Config::shutdown_timeout`]; evaluations that are not stored by then are
-    /// computed again by the next coordinator on the same store.
-    pub async fn shutdown(self) {
+    /// Sends no new batch, closes every stream and stores everything complete. Waits for that at most
+    /// [`Config::shutdown_timeout`]. Workers that end afterwards are not lost. All that is left to do
+    /// is [`Self::shutdown`].
+    pub async fn drain(&mut self) {
+        if std::mem::replace(&mut self.drained, true) {
+            return;
+        }
         self.failing.disarm();
         let stop = async {
             let (reply, stopped) = oneshot::channel();
@@ -231,6 +236,12 @@ impl Coordinator {
         if tokio::time::timeout(self.shutdown_timeout, stop).await.is_err() {
             tracing::warn!("shutting down before everything is stored");
         }
+    }
+
+    /// Drains and stops; evaluations that are not stored by then are computed again by the next
+    /// coordinator on the same store.
+    pub async fn shutdown(mut self) {
+        self.drain().await;
         self.core.abort();
         let _ = self.core.await;
         drop(self.metrics);

@@ -101,6 +101,8 @@ async fn take_answers(
     while let Ok(Some(AttachRequest { message: Some(message) })) = requests.message().await {
         let answered = match &message {
             Request::Result(result) => result.batch,
+            // It holds nothing any more.
+            Request::Drain(_) => return,
             _ => 0,
         };
         heard.lock().unwrap().push(message);
