@@ -9,6 +9,7 @@ use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX};
 use osteon_proto::credentials::Credentials;
 use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::identity;
+use osteon_proto::status::retry_after;
 use osteon_proto::tls_failure::TlsFailure;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::{AttachRequest, AttachResponse};
@@ -136,6 +137,8 @@ enum End {
     Left,
     /// The connection was lost, for this reason: retry.
     Lost(String),
+    /// The coordinator closed the stream for this reason, and states when to retry.
+    Deferred(String, Duration),
 }
 
 impl Worker {
@@ -146,9 +149,10 @@ impl Worker {
     ) -> Result<(), WorkerError> {
         let mut backoff = Backoff::default();
         loop {
-            let last = match self.attachment(leave.as_mut(), &mut backoff).await? {
+            let (last, stated) = match self.attachment(leave.as_mut(), &mut backoff).await? {
                 End::Left => return Ok(()),
-                End::Lost(reason) => reason,
+                End::Lost(reason) => (reason, None),
+                End::Deferred(reason, delay) => (reason, Some(delay)),
             };
             if let Some(End::Left) = self.apply(Event::Lost, None)? {
                 return Ok(());
@@ -159,7 +163,8 @@ impl Worker {
                 let (endpoint, seconds) = (self.endpoint.clone(), away.as_secs_f64().round());
                 return Err(WorkerError::GaveUp { endpoint, seconds, last });
             }
-            let wait = backoff.next().min(left.unwrap_or(Duration::MAX));
+            let wait = stated.map_or_else(|| backoff.next(), Backoff::stated);
+            let wait = wait.min(left.unwrap_or(Duration::MAX));
             let wait_ms = wait.as_millis() as u64;
             warn!(endpoint = %self.endpoint, wait_ms, reason = last, "reconnecting");
             if timeout(wait, leave.as_mut()).await.is_ok() {
@@ -305,7 +310,13 @@ impl Worker {
                 let (endpoint, code) = (self.endpoint.clone(), status.code());
                 Err(WorkerError::Refused { endpoint, code, reason })
             }
-            code => Ok(End::Lost(format!("{code}: {reason}"))),
+            code => {
+                let reason = format!("{code}: {reason}");
+                Ok(match retry_after(status) {
+                    Some(delay) => End::Deferred(reason, delay),
+                    None => End::Lost(reason),
+                })
+            }
         }
     }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use osteon_proto::announced::Announced;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::evaluation::{self, EvaluationInput};
-use osteon_proto::status::resource_exhausted;
+use osteon_proto::status::{resource_exhausted, unavailable};
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::{AttachResponse, BatchRevoke, Heartbeat, WorkerDrain, WorkerWelcome};
 use tokio::sync::{mpsc, oneshot};
@@ -21,6 +21,9 @@ pub(crate) const OUTBOUND_MAX: usize = 96;
 
 /// Time after which a worker that was refused for lack of room may try again.
 const RETRY: Duration = Duration::from_secs(30);
+/// Time after which the workers of a coordinator that stops may look for the next one: none can be
+/// there sooner, and thousands of workers need not ask before.
+const RETRY_STOPPED: Duration = Duration::from_secs(1);
 
 /// A message to a worker, or the status that ends its stream.
 pub(crate) type Outgoing = Result<AttachResponse, Status>;
@@ -144,7 +147,7 @@ pub(crate) fn status(reason: &CloseReason) -> Status {
             Code::Aborted
         }
         CloseReason::Drained => Code::Ok,
-        CloseReason::Draining => Code::Unavailable,
+        CloseReason::Draining => return unavailable(reason.to_string(), RETRY_STOPPED),
     };
     Status::new(code, reason.to_string())
 }
@@ -201,6 +204,16 @@ mod tests {
             }
         }
         announced
+    }
+
+    #[test]
+    fn a_worker_is_told_when_to_attach_again() {
+        let after = |reason: CloseReason| osteon_proto::status::retry_after(&status(&reason));
+        let full = CloseReason::TooManyWorkers { limit: 4096 };
+        assert_eq!(after(full), Some(Duration::from_secs(30)));
+        assert_eq!(after(CloseReason::Draining), Some(Duration::from_secs(1)));
+        // Nothing keeps a worker that was given up for lost from coming back at once.
+        assert_eq!(after(CloseReason::Expired { silent: Duration::from_secs(10) }), None);
     }
 
     #[test]
