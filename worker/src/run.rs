@@ -3,12 +3,14 @@
 
 use std::future::Future;
 use std::pin::{Pin, pin};
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
 
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX};
 use osteon_proto::credentials::Credentials;
 use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::identity;
+use osteon_proto::spans::SpanRecorder;
 use osteon_proto::status::retry_after;
 use osteon_proto::tls_failure::TlsFailure;
 use osteon_proto::v1::attach_request::Message as Request;
@@ -22,6 +24,7 @@ use tracing::{info, trace, warn};
 
 use crate::backend::{Backend, Computed, Task};
 use crate::backoff::Backoff;
+use crate::batch_spans::BatchSpans;
 use crate::compute::Cores;
 use crate::error::WorkerError;
 use crate::state::{BATCHES_HELD_MAX, Detached, Effect, Event, Failure, Identity, State};
@@ -51,6 +54,8 @@ pub struct WorkerConfig {
     pub time_limit: Option<Duration>,
     /// Time without work, or without a coordinator, after which the worker ends; `None` to stay.
     pub idle_timeout: Option<Duration>,
+    /// Where the spans of batches go that the coordinator traces.
+    pub spans: Option<Arc<dyn SpanRecorder>>,
 }
 
 /// Serves a coordinator until `shutdown` completes, the time limit has passed, or there was no work
@@ -101,6 +106,7 @@ async fn run_on(
         ever_answered: false,
         endpoint: config.endpoint.clone(),
         credentials: config.credentials.clone(),
+        spans: config.spans.clone().map(BatchSpans::new),
     };
     let leave = async {
         match config.time_limit {
@@ -129,6 +135,8 @@ struct Worker {
     ever_answered: bool,
     endpoint: Endpoint,
     credentials: Credentials,
+    /// Present if spans are recorded.
+    spans: Option<BatchSpans>,
 }
 
 /// Outcome of an attachment.
@@ -185,13 +193,9 @@ impl Worker {
             () = leave.as_mut() => return Ok(End::Left),
             connected = connect(&endpoint, &credentials) => connected,
         };
+        // From the hello on, the coordinator may send batches: whoever leaves must drain.
         let hello = self.state.attach();
-        let opened = match connected {
-            // From the hello on, the coordinator may send batches: whoever leaves must drain.
-            Ok(channel) => open(channel, hello, &outbox, requests).await,
-            Err(error) => Err(error),
-        };
-        let mut responses = match opened {
+        let mut responses = match open(connected, hello, &outbox, requests).await {
             Ok(responses) => {
                 self.ever_answered = true;
                 responses
@@ -267,6 +271,9 @@ impl Worker {
             self.backend.forget(*task);
         }
         trace!(?event, "event");
+        if let Some(spans) = &mut self.spans {
+            spans.before(&event, SystemTime::now());
+        }
         let mut end = None;
         for effect in self.state.react(self.started.elapsed(), event) {
             match effect {
@@ -277,6 +284,9 @@ impl Worker {
                     }
                 }
                 Effect::Compute(task, work) => {
+                    if let Some(spans) = &mut self.spans {
+                        spans.begun(task, &work);
+                    }
                     let sender = self.finished_sender.clone();
                     let done = move |computed| {
                         // Fails only if the worker has ended; the result is then not needed.
@@ -284,7 +294,12 @@ impl Worker {
                     };
                     self.backend.start(task, work, Box::new(done));
                 }
-                Effect::Abandon(task) => self.backend.forget(task),
+                Effect::Abandon(task) => {
+                    if let Some(spans) = &mut self.spans {
+                        spans.abandoned(task);
+                    }
+                    self.backend.forget(task);
+                }
                 Effect::Detach(why) => end = Some(End::Lost(detached(why).to_owned())),
                 Effect::Leave => return Ok(Some(End::Left)),
                 Effect::Fail(failure) => return Err(self.failed(failure)),
@@ -356,9 +371,9 @@ async fn connect(endpoint: &Endpoint, credentials: &Credentials) -> Result<Conne
     })
 }
 
-/// Sends the hello.
+/// Sends the hello on a new connection, if there is one.
 async fn open(
-    channel: Connection,
+    connected: Result<Connection, OpenError>,
     hello: Request,
     outbox: &mpsc::Sender<AttachRequest>,
     requests: mpsc::Receiver<AttachRequest>,
@@ -367,7 +382,7 @@ async fn open(
     let unanswered = || OpenError::Unreachable("the coordinator does not answer".to_owned());
     // The outbox is empty, so the hello always fits.
     outbox.try_send(AttachRequest { message: Some(hello) }).map_err(|_| unanswered())?;
-    let mut client = endpoint::workers_client(channel);
+    let mut client = endpoint::workers_client(connected?);
     match timeout(limit, client.attach(ReceiverStream::new(requests))).await {
         Ok(Ok(response)) => Ok(response.into_inner()),
         Ok(Err(status)) => Err(OpenError::Status(status)),

@@ -29,6 +29,7 @@ use crate::metrics::write_times::WriteTimes;
 use crate::service::accept;
 use crate::service::core_task::{Clock, Core, Message};
 use crate::service::failing::{ComponentFailure, FailureReporter, Guard};
+use crate::service::job_spans::JobSpans;
 use crate::service::jobs::JobsService;
 use crate::service::listen::Listener;
 use crate::service::meter::Meter;
@@ -152,6 +153,7 @@ pub async fn start(
     let metrics = listener.metrics.take().map(|listener| {
         MetricsTask::start(listener, MetricSources::new(messages.clone(), write_times))
     });
+    let listener_spans = listener.spans.take();
     let (policy, decided) = watch::channel(Arc::new(listener.policy.clone()));
     let (tls, shown) = listener.tls.clone().map(watch::channel).unzip();
     let router = services(&messages, &commands, decided, config).await?;
@@ -161,7 +163,8 @@ pub async fn start(
     let server = tokio::spawn(guarded(failing.guard(ComponentFailure::Server), server));
     let guard = failing.guard(ComponentFailure::Core);
     let meter = metrics.is_some().then(Meter::default);
-    let core = Core::new(state, clock, commands, events, failing.clone(), meter);
+    let spans = listener_spans.map(JobSpans::new);
+    let core = Core::new(state, clock, commands, events, failing.clone(), meter, spans);
     let core = core.run(effects, inbox, from_store, config.tick);
     let core = tokio::spawn(guarded(guard, core));
     tracing::info!(%url, "listening");

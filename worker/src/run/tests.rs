@@ -258,6 +258,7 @@ fn config(scene: &Scene) -> WorkerConfig {
         give_up_after: None,
         time_limit: None,
         idle_timeout: None,
+        spans: None,
     }
 }
 
@@ -320,6 +321,7 @@ async fn threads_have_bounds() {
             give_up_after: None,
             time_limit: None,
             idle_timeout: None,
+            spans: None,
         };
         let error = run(config, pending()).await.unwrap_err();
         assert!(matches!(error, WorkerError::Threads { .. }), "{error}");

@@ -436,7 +436,9 @@ fn malformed(defect: Malformed) -> Effect {
 
 #[test]
 fn a_batch_of_an_unknown_evaluation_ends_the_worker() {
-    let of = |evaluation| Response::Batch(v1::Batch { batch: 1, evaluation, first: 0, count: 1 });
+    let of = |evaluation| {
+        Response::Batch(v1::Batch { batch: 1, evaluation, count: 1, ..v1::Batch::default() })
+    };
     let unknown = |evaluation| [malformed(Malformed::UnknownEvaluation { evaluation })];
     let mut worker = Recorder::attached();
     worker.message(of(7));
