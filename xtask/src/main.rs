@@ -6,6 +6,7 @@ mod deploy;
 mod digests;
 mod fleet;
 mod metrics;
+mod peers;
 mod python;
 mod random;
 mod reference;
@@ -147,6 +148,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         "bench-fleet",
         "measures jobs on fleets of simulated workers; --help lists the options",
         Action::Function(fleet::bench),
+    ),
+    (
+        "bench-peers",
+        "compares the overhead with that of xargs, Dask, Ray and HyperQueue: --rounds N (3)",
+        Action::Function(peers::bench),
     ),
     ("docs", "the documentation of all crates", Action::Cargo(&[DOCS])),
 ];
