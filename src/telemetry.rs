@@ -42,7 +42,6 @@ impl Telemetry {
 
     /// Begins nothing: this program is built without the feature `otel`.
     #[cfg(not(feature = "otel"))]
-    #[expect(clippy::unnecessary_wraps, reason = "it may fail with the feature")]
     pub(crate) fn start(_: &Resolved) -> Result<Self, CommandFailure> {
         Ok(Self {})
     }
