@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::outcome::{Outcome, RealizationResult, encode};
+use osteon_common::outcome::{FailureKind, Outcome, RealizationResult, encode};
 use osteon_common::parameters::Point;
 use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
@@ -302,20 +302,25 @@ impl PendingEvaluation {
     /// Returns all outcomes in index order and the estimated errors of the successes, once it is
     /// settled.
     pub fn complete(&self) -> Option<(Arc<[Outcome]>, Option<EstimatedError>)> {
-        if !self.is_settled() {
+        Some((self.outcomes()?, self.estimated_error()))
+    }
+
+    /// Returns all outcomes in index order, once it is settled.
+    pub(crate) fn outcomes(&self) -> Option<Arc<[Outcome]>> {
+        if !self.is_settled() || self.results.iter().any(Option::is_none) {
             return None;
         }
-        // With a known length nothing is copied while it grows: there may be millions.
-        let mut outcomes = Vec::with_capacity(self.results.len());
+        // None is empty. With a known length they are written to their place at once.
+        let empty = Err(FailureKind::NotFinite);
+        Some(self.results.iter().map(|result| result.map_or(empty, |it| it.outcome)).collect())
+    }
+
+    /// Returns the estimated errors of the successes so far.
+    pub(crate) fn estimated_error(&self) -> Option<EstimatedError> {
         let mut errors = Vec::with_capacity(self.results.len());
-        for result in &self.results {
-            let RealizationResult { outcome, estimated_error } = (*result)?;
-            outcomes.push(outcome);
-            if outcome.is_ok() {
-                errors.push(estimated_error);
-            }
-        }
-        Some((outcomes.into(), quantile::estimated_error(errors)))
+        let successes = self.results.iter().flatten().filter(|solved| solved.outcome.is_ok());
+        errors.extend(successes.map(|solved| solved.estimated_error));
+        quantile::estimated_error(errors)
     }
 }
 
