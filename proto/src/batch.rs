@@ -56,26 +56,39 @@ pub fn answer_to_message(
 ) -> v1::BatchResult {
     let (codes, velocities) = solved.iter().map(|solved| outcome::encode(solved.outcome)).unzip();
     let estimated_errors = solved.iter().map(|solved| solved.estimated_error).collect();
-    v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors }
+    let has_decays = solved.iter().any(|solved| solved.decay.to_bits() != 0);
+    let decays = match has_decays {
+        true => solved.iter().map(|solved| solved.decay).collect(),
+        false => Vec::new(),
+    };
+    v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors, decays }
 }
 
 /// Returns the realizations of an answer, in index order.
 ///
 /// # Errors
 /// If the lengths differ, if a code and a velocity do not encode an outcome, or if an estimated
-/// error is not allowed for its outcome.
+/// error or a decay is not allowed for its outcome. Without decays, each is 0.
 pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationResult>, Malformed> {
     let outcomes = realizations::unpack(&message.codes, &message.velocities)?;
     let (found, expected) = (message.estimated_errors.len(), outcomes.len());
     if found != expected {
         return Err(Malformed::WrongLength { field: "estimated_errors", found, expected });
     }
+    let found = message.decays.len();
+    if found != 0 && found != expected {
+        return Err(Malformed::WrongLength { field: "decays", found, expected });
+    }
     let pairs = outcomes.into_iter().zip(&message.estimated_errors).enumerate();
     pairs
         .map(|(index, (outcome, &estimated_error))| {
-            let solved = RealizationResult { outcome, estimated_error };
-            let unsound = Malformed::EstimatedError { index, value: estimated_error };
-            solved.is_consistent().then_some(solved).ok_or(unsound)
+            let decay = message.decays.get(index).copied().unwrap_or(0.0);
+            let solved = RealizationResult { outcome, estimated_error, decay };
+            match (solved.has_valid_error(), solved.has_valid_decay()) {
+                (true, true) => Ok(solved),
+                (false, _) => Err(Malformed::EstimatedError { index, value: estimated_error }),
+                (true, false) => Err(Malformed::Decay { index, value: decay }),
+            }
         })
         .collect()
 }
@@ -99,6 +112,7 @@ mod tests {
             setup: Setup::default(),
             point: Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
             random: RandomQuantities::default(),
+            with_decays: false,
             germs: GermSource::streams(1),
         })
     }
@@ -123,9 +137,9 @@ mod tests {
     #[test]
     fn answers_survive_the_wire_and_unsound_ones_do_not() {
         let solved = [
-            RealizationResult { outcome: Ok(3900.5), estimated_error: 2e-5 },
+            RealizationResult { outcome: Ok(3900.5), estimated_error: 2e-5, decay: 0.0 },
             RealizationResult::failed(FailureKind::NoArrival),
-            RealizationResult { outcome: Ok(3901.5), estimated_error: 0.0 },
+            RealizationResult { outcome: Ok(3901.5), estimated_error: 0.0, decay: 0.0 },
         ];
         let message = answer_to_message(7, &solved, 0.25);
         assert_eq!((message.batch, message.elapsed_s), (7, 0.25));

@@ -36,7 +36,7 @@ impl Completion {
     pub fn run(self) -> Completed {
         let Self { job, evaluation, search: mut after } = self;
         let attempt = evaluation.attempt;
-        let record = evaluation.complete().map(|(outcomes, estimated_error)| {
+        let record = evaluation.complete(after.has_decays()).map(|(outcomes, estimated_error)| {
             let is_last = evaluation.diverges_from_store(&outcomes);
             let (number, point) = (evaluation.number, evaluation.point);
             let workers = evaluation.workers.iter().cloned().collect();

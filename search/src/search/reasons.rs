@@ -145,9 +145,12 @@ fn advice(specification: &JobSpecification, held_by_bounds: bool) -> String {
     choices.join(", or ")
 }
 
-/// Returns whether the lowest cost need not match both moments: that of a likelihood, or with priors.
+/// Returns whether the lowest cost need not match all moments: that of a likelihood, with priors, or of
+/// three moments by fewer parameters.
 fn is_compromise(specification: &JobSpecification) -> bool {
-    specification.objective == Objective::Likelihood || specification.has_priors()
+    specification.objective == Objective::Likelihood
+        || specification.has_priors()
+        || specification.has_decays()
 }
 
 /// Explains how far off the best point is after the last evaluation, unless it matches.
