@@ -9,6 +9,8 @@ use osteon_common::job::{
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, Status};
 
+mod decays;
+
 use super::*;
 
 /// Only e_L and the dispersion are free.
