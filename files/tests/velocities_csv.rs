@@ -98,6 +98,32 @@ fn subjects_are_numbered_in_each_group() {
 }
 
 #[test]
+fn decays_are_a_column() {
+    let row = |k: u32| (3900.0 + f64::from(k * k), 4.5 + f64::from(k * 7 % 10) / 10.0);
+    let rows: Vec<(f64, f64)> = (0..10).map(row).collect();
+    let lines: String = rows.iter().map(|(v, d)| format!("{d:?},{v:?}\n")).collect();
+    let more = "decay = \"dB/cm\"";
+    let data = read_as(format!("dB/cm,velocity\n{lines}").as_bytes(), more).unwrap().unwrap();
+    let (velocities, decays): (Vec<f64>, Vec<f64>) = rows.into_iter().unzip();
+    let found = data.set(0).unwrap();
+    assert_eq!((found.velocities, found.decays), (&velocities[..], Some(&decays[..])));
+    let check = |rows: &str, expected: &str| {
+        let text = format!("dB/cm,velocity\n{rows}{lines}");
+        let message = read_as(text.as_bytes(), more).unwrap_err();
+        assert!(message.contains(expected), "{message}");
+    };
+    let line = "data.velocities: DIR/data/v.csv, line 2: `dB/cm` is";
+    let line = line.replace('`', "");
+    for wrong in ["", "x", "nan", "-100.5", "462"] {
+        check(&format!("{wrong},3900\n"), &format!("{line} {wrong:?}; it must be the decay"));
+    }
+    let columns = read_as(b"d,velocity\n4.5,3900\n4.6,3910\n", more).unwrap_err();
+    assert!(columns.contains("no column `dB/cm`; the header has `d`, `velocity`"), "{columns}");
+    let few = read_as(b"dB/cm,velocity\n4.5,3900\n4.6,3910\n", more).unwrap_err();
+    assert!(few.contains("data.decay: there are 2 velocities; with decays at least 10"), "{few}");
+}
+
+#[test]
 fn what_is_known_of_each_group_is_a_column() {
     let text = "q,bone,t,velocity\n15,a,3e-3,3900\n20.5,b,0.0041,3910\n15.0,a,0.003,3920\n";
     let known = |more: &str| -> [Vec<(&str, f64)>; 2] {

@@ -164,6 +164,32 @@ mod tests {
     }
 
     #[test]
+    fn decays_survive_the_wire_and_none_take_no_bytes() {
+        let solved = [
+            RealizationResult { outcome: Ok(3900.5), estimated_error: 2e-5, decay: 4.625 },
+            RealizationResult::failed(FailureKind::NoArrival),
+            RealizationResult { outcome: Ok(3901.5), estimated_error: 0.0, decay: -0.5 },
+        ];
+        let message = answer_to_message(7, &solved, 0.25);
+        assert_eq!(message.decays, [4.625, 0.0, -0.5]);
+        assert_eq!(answer_from_message(&message).unwrap(), solved);
+        let without = solved.map(|one| RealizationResult { decay: 0.0, ..one });
+        assert_eq!(answer_to_message(7, &without, 0.25).decays, [0.0; 0]);
+        let refused = |change: fn(&mut v1::BatchResult)| {
+            let mut message = message.clone();
+            change(&mut message);
+            answer_from_message(&message).unwrap_err()
+        };
+        let (field, found, expected) = ("decays", 2, 3);
+        let short = refused(|answer| answer.decays.truncate(2));
+        assert_eq!(short, Malformed::WrongLength { field, found, expected });
+        let of_failure = refused(|answer| answer.decays[1] = 4.6);
+        assert_eq!(of_failure, Malformed::Decay { index: 1, value: 4.6 });
+        let infinite = refused(|answer| answer.decays[2] = f64::INFINITY);
+        assert_eq!(infinite, Malformed::Decay { index: 2, value: f64::INFINITY });
+    }
+
+    #[test]
     fn what_a_worker_must_not_guess_is_refused() {
         let mut received = Received::default();
         received.receive(&evaluation(7)).unwrap();

@@ -1,10 +1,11 @@
 //! Rules on measured decays.
 
 use crate::accepted::Interval;
-use crate::data::Data;
+use crate::data::{Data, VelocitySet};
 use crate::field_path::{element_path, entry_path};
 use crate::inference::{DECAY_PARTS_MIN, DecayWeights};
 use crate::job::{JobKind, JobSpecification, Objective, SearchMethod};
+use crate::limits::DATA_VELOCITIES_MAX;
 use crate::origin::Origin;
 use crate::statistics::measured_decay;
 use crate::violations::Violations;
@@ -18,6 +19,17 @@ const REFUSED_MAX: usize = 10;
 
 /// Checks the decays of all sets, of which there have to be as many as velocities.
 pub(super) fn all_decays(data: &Data, origin: Option<&Origin>, violations: &mut Violations) {
+    let numbers = |set: VelocitySet<'_>| {
+        let decays = set.decays.map_or(0, <[f64]>::len);
+        (decays > 0).then(|| set.velocities.len() + decays + set.subjects.map_or(0, <[u32]>::len))
+    };
+    let all: usize = (0..data.sets()).filter_map(|set| data.set(set).and_then(numbers)).sum();
+    if all > DATA_VELOCITIES_MAX && !violations.has_at_or_below("data") {
+        let most = DATA_VELOCITIES_MAX;
+        let what = "velocities, decays and subjects together";
+        violations.add("data", format!("has {all} {what}; at most {most}"));
+        return;
+    }
     if data.is_grouped() && !has_all_or_none(data, violations) {
         return;
     }
@@ -46,7 +58,11 @@ pub(super) fn all_decays(data: &Data, origin: Option<&Origin>, violations: &mut 
 }
 
 /// Checks the requirements of decays on the rest of an identification.
-pub(super) fn decays_of_job(specification: &JobSpecification, violations: &mut Violations) {
+pub(super) fn decays_of_job(
+    specification: &JobSpecification,
+    origin: Option<&Origin>,
+    violations: &mut Violations,
+) {
     if specification.kind != JobKind::Identification || !specification.has_decays() {
         return;
     }
@@ -90,7 +106,8 @@ pub(super) fn decays_of_job(specification: &JobSpecification, violations: &mut V
         if let Some(refusal) = unusable(data, number) {
             let name = data.names().nth(number);
             let of = name.map_or_else(String::new, |name| format!("of the group {name:?}: "));
-            violations.add("data.decays", format!("{of}{refusal}"));
+            let field = if origin.is_some() { "data.decay" } else { "data.decays" };
+            violations.add(field, format!("{of}{refusal}"));
             return;
         }
     }

@@ -64,7 +64,7 @@ pub fn job_from(
     evaluations(specification, violations);
     likelihood(specification, violations);
     chi_square(specification, violations);
-    decays_of_job(specification, violations);
+    decays_of_job(specification, origin, violations);
     posterior_of_job(specification, violations);
     within_reach(specification, violations);
 }

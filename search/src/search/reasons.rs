@@ -190,6 +190,9 @@ fn misfit(best: &Evaluation, agreement: &Agreement, specification: &JobSpecifica
     };
     let cost = match specification.objective {
         Objective::ChiSquare if specification.has_priors() => "best χ² with the priors' penalty",
+        Objective::ChiSquare if agreement.decay.is_some() => {
+            "best χ² (of at most 3 degrees of freedom)"
+        }
         Objective::ChiSquare => "best χ² (of at most 2 degrees of freedom)",
         Objective::Moments | Objective::Likelihood => "best cost",
     };
@@ -198,9 +201,15 @@ fn misfit(best: &Evaluation, agreement: &Agreement, specification: &JobSpecifica
         Objective::Likelihood => String::new(),
         _ => format!(", cost_tolerance is {:?}", specification.search.cost_tolerance),
     };
+    let decay = agreement.decay.map_or_else(String::new, |[difference, error]| {
+        let side = if difference < 0.0 { "below" } else { "above" };
+        let (percent, count) =
+            (rounded(100.0 * difference.abs()), rounded(difference.abs() / error));
+        format!(", its mean decay {percent} % {side} the data's ({count} standard errors)")
+    });
     format!(
         "the {cost} is {:.3e}{tolerance}; the model's mean velocity is {}, its coefficient of \
-         variation {}{held}",
+         variation {}{decay}{held}",
         best.cost.unwrap_or(f64::NAN),
         off(0),
         off(1)
@@ -242,6 +251,10 @@ fn holds_back(
     agreement: &Agreement,
     specification: &JobSpecification,
 ) -> bool {
+    if specification.has_decays() {
+        // The closed form knows nothing of decays.
+        return true;
+    }
     let step = match side {
         Side::Lower => -BEYOND,
         Side::Upper => BEYOND,
