@@ -173,6 +173,9 @@ pub trait Store {
     /// each of them again to learn which.
     fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError>;
 
+    /// Does what no record has to wait for. Whatever is durable is so before.
+    fn settle(&mut self) {}
+
     /// Returns all jobs, in the order of their identifiers.
     ///
     /// # Errors

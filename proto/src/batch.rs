@@ -8,7 +8,6 @@ use osteon_common::outcome::{self, RealizationResult};
 use crate::announced::Received;
 use crate::evaluation::EvaluationInput;
 use crate::malformed::Malformed;
-use crate::realizations;
 use crate::v1;
 
 /// The work of one batch: realizations `first`, `first + 1`, … `first + count - 1` of one
@@ -70,27 +69,36 @@ pub fn answer_to_message(
 /// If the lengths differ, if a code and a velocity do not encode an outcome, or if an estimated
 /// error or a decay is not allowed for its outcome. Without decays, each is 0.
 pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationResult>, Malformed> {
-    let outcomes = realizations::unpack(&message.codes, &message.velocities)?;
-    let (found, expected) = (message.estimated_errors.len(), outcomes.len());
-    if found != expected {
-        return Err(Malformed::WrongLength { field: "estimated_errors", found, expected });
+    let v1::BatchResult { codes, velocities, estimated_errors, decays, .. } = message;
+    let expected = codes.len();
+    for (field, found) in
+        [("velocities", velocities.len()), ("estimated_errors", estimated_errors.len())]
+    {
+        if found != expected {
+            return Err(Malformed::WrongLength { field, found, expected });
+        }
     }
-    let found = message.decays.len();
-    if found != 0 && found != expected {
-        return Err(Malformed::WrongLength { field: "decays", found, expected });
+    let has_decays = !decays.is_empty();
+    if has_decays && decays.len() != expected {
+        let (field, found) = ("decays", decays.len());
+        return Err(Malformed::WrongLength { field, found, expected });
     }
-    let pairs = outcomes.into_iter().zip(&message.estimated_errors).enumerate();
-    pairs
-        .map(|(index, (outcome, &estimated_error))| {
-            let decay = message.decays.get(index).copied().unwrap_or(0.0);
-            let solved = RealizationResult { outcome, estimated_error, decay };
-            match (solved.has_valid_error(), solved.has_valid_decay()) {
-                (true, true) => Ok(solved),
-                (false, _) => Err(Malformed::EstimatedError { index, value: estimated_error }),
-                (true, false) => Err(Malformed::Decay { index, value: decay }),
-            }
-        })
-        .collect()
+    let rows = codes.iter().zip(velocities).zip(estimated_errors).enumerate();
+    let mut results = Vec::with_capacity(expected);
+    for (index, ((&code, &velocity), &estimated_error)) in rows {
+        let outcome = outcome::decode(code, velocity);
+        let outcome = outcome.ok_or(Malformed::Outcome { index, code, velocity })?;
+        let decay = if has_decays { decays[index] } else { 0.0 };
+        let solved = RealizationResult { outcome, estimated_error, decay };
+        if !solved.has_valid_error() {
+            return Err(Malformed::EstimatedError { index, value: estimated_error });
+        }
+        if !solved.has_valid_decay() {
+            return Err(Malformed::Decay { index, value: decay });
+        }
+        results.push(solved);
+    }
+    Ok(results)
 }
 
 #[cfg(test)]

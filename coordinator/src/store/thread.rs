@@ -154,8 +154,13 @@ impl PendingWork<'_> {
                     // The receiver is gone when the coordinator has stopped.
                     drop(self.events.blocking_send(event));
                 };
-                inbox.group(record, &mut self.readings).write(store, &mut report);
+                let group = inbox.group(record, &mut self.readings);
+                group.write(store, &mut report);
                 self.write_times.add(took.unwrap_or_else(|| begun.elapsed()));
+                // A large record is often followed by the end of its job, which should not wait.
+                if group.is_small() {
+                    store.settle();
+                }
             }
             StoreCommand::Read { job, number } => {
                 let found = store.evaluation(job, number).map_err(|error| unread(job, error));
