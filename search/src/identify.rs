@@ -73,7 +73,8 @@ pub enum IdentifyError<E> {
     /// The caller returned an outcome that no realization can have.
     #[error(
         "realization {index} of evaluation {number} is {solved:?}; a velocity must be finite and above 0, \
-         its estimated error finite and at least 0, its decay finite, and both 0 where there is no velocity"
+         its estimated error finite and at least 0, its decay finite (and not 0 if decays were measured), and \
+         both 0 where there is no velocity"
     )]
     Unsound {
         /// Number of the evaluation.
@@ -170,16 +171,18 @@ fn solve<E>(
     evaluate: &mut impl FnMut(&Realizations) -> Result<Vec<RealizationResult>, E>,
 ) -> Result<Vec<RealizationResult>, IdentifyError<E>> {
     let count = specification.monte_carlo.realizations;
+    let with_decays = specification.has_decays();
     let Ok(ensemble) = specification.ensemble(&point) else {
         return Ok((0..count).map(|_| RealizationResult::failed(FailureKind::NotFinite)).collect());
     };
-    let solved =
-        evaluate(&Realizations { point, ensemble, count, with_decays: specification.has_decays() })
-            .map_err(|cause| IdentifyError::Evaluation { number, point: Box::new(point), cause })?;
+    let solved = evaluate(&Realizations { point, ensemble, count, with_decays })
+        .map_err(|cause| IdentifyError::Evaluation { number, point: Box::new(point), cause })?;
     if solved.len() as u64 != count {
         return Err(IdentifyError::Count { number, found: solved.len(), expected: count });
     }
-    match solved.iter().position(|one| !is_sound(one)) {
+    let lacks_decay =
+        |one: &RealizationResult| with_decays && one.outcome.is_ok() && one.decay.to_bits() == 0;
+    match solved.iter().position(|one| !is_sound(one) || lacks_decay(one)) {
         Some(index) => Err(IdentifyError::Unsound { number, index, solved: solved[index] }),
         None => Ok(solved),
     }

@@ -157,6 +157,13 @@ fn a_decay_enters_path_and_digest() {
         Ok::<_, Infallible>(solved)
     };
     assert_ne!(identify(&job, one_bit).unwrap().result.digest, first.digest);
+    let none = |realizations: &Realizations| {
+        let mut solved = observed(realizations);
+        solved[5].decay = 0.0;
+        Ok::<_, Infallible>(solved)
+    };
+    let refused = identify(&job, none).unwrap_err();
+    assert!(matches!(refused, IdentifyError::Unsound { number: 0, index: 5, .. }), "{refused}");
 }
 
 #[test]
