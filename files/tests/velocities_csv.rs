@@ -22,6 +22,11 @@ fn read_as(bytes: &[u8], more: &str) -> Result<Option<Data>, String> {
     let given = "velocities = [3900.5, 4000, 3950.25]";
     let text = include_str!("files/job.toml")
         .replace(given, &format!("velocities = \"data/v.csv\"\n{more}"));
+    // Decays need χ².
+    let text = match more.contains("decay") {
+        true => text.replace("kind = \"moments\"", "kind = \"chi_square\""),
+        false => text,
+    };
     match job_file::parse(&text, Format::Toml, directory.path(), JobKind::Identification) {
         Ok(job) => Ok(job.data),
         Err(error) => Err(error.to_string().replace(&*directory.path().to_string_lossy(), "DIR")),
