@@ -4,6 +4,7 @@
 //! to be wrong is not checked again, nor is a relation between fields of which one is wrong.
 
 mod data;
+mod decays;
 mod job;
 mod known_quantities;
 mod posterior;
@@ -19,6 +20,7 @@ use crate::job::JobSpecification;
 use crate::violations::Violations;
 
 pub use self::data::{COUNT, DATA_FORMS, REPEATABILITY, VELOCITIES_MIN, VELOCITY, data, no_data};
+pub use self::decays::DECAY;
 pub use self::job::{job, job_from};
 pub use self::posterior::posterior;
 pub use self::random_quantities::random_quantities;

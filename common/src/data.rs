@@ -26,6 +26,8 @@ pub enum Measurements {
         velocities: Vec<f64>,
         /// Subject of each velocity, as for [`Group::subjects`].
         subjects: Option<Vec<u32>>,
+        /// Decay measured with each velocity, as for [`Group::decays`].
+        decays: Option<Vec<f64>>,
     },
     /// Several sets of velocities. Each group is identified separately, in this order; at least one
     /// of them has two different velocities.
@@ -52,6 +54,9 @@ pub struct Group {
     /// Subject of each velocity, from 0, numbered by [`numbered`]: velocities of one subject are
     /// not independent. `None` if all velocities are independent.
     pub subjects: Option<Vec<u32>>,
+    /// Decay along the array that was measured with each velocity, dB/cm; of all groups of a job, or
+    /// of none.
+    pub decays: Option<Vec<f64>>,
     /// Quantities of the setup that are known of this group; the same ones of all groups of a job.
     pub known: KnownQuantities,
 }
@@ -63,6 +68,8 @@ pub struct VelocitySet<'a> {
     pub velocities: &'a [f64],
     /// Subject of each velocity, as for [`Group::subjects`].
     pub subjects: Option<&'a [u32]>,
+    /// Decay measured with each velocity, as for [`Group::decays`].
+    pub decays: Option<&'a [f64]>,
     /// The instrument's own standard deviation, m/s.
     pub repeatability: f64,
 }
@@ -100,7 +107,7 @@ impl Group {
     /// Creates a group of independent velocities, m/s.
     pub fn new(name: impl Into<String>, velocities: Vec<f64>) -> Self {
         let known = KnownQuantities::default();
-        Self { name: name.into(), velocities, subjects: None, known }
+        Self { name: name.into(), velocities, subjects: None, decays: None, known }
     }
 
     /// Returns the reason why this group cannot be searched; `None` if it can.
@@ -118,7 +125,7 @@ impl Group {
 impl Data {
     /// Creates data of one set of independent velocities, m/s.
     pub const fn from_velocities(velocities: Vec<f64>) -> Self {
-        Self::exact(Measurements::Velocities { velocities, subjects: None })
+        Self::exact(Measurements::Velocities { velocities, subjects: None, decays: None })
     }
 
     /// Creates data of several sets of velocities.
@@ -185,16 +192,18 @@ impl Data {
 
     /// Returns a set of velocities, by its number; `None` if only the moments are known.
     pub fn set(&self, set: usize) -> Option<VelocitySet<'_>> {
-        let (velocities, subjects) = match &self.measurements {
-            Measurements::Velocities { velocities, subjects } => (velocities, subjects),
+        let (velocities, subjects, decays) = match &self.measurements {
+            Measurements::Velocities { velocities, subjects, decays } => {
+                (velocities, subjects, decays)
+            }
             Measurements::Groups(groups) => {
                 let group = groups.get(set)?;
-                (&group.velocities, &group.subjects)
+                (&group.velocities, &group.subjects, &group.decays)
             }
             Measurements::Moments { .. } => return None,
         };
-        let subjects = subjects.as_deref();
-        Some(VelocitySet { velocities, subjects, repeatability: self.repeatability })
+        let (subjects, decays) = (subjects.as_deref(), decays.as_deref());
+        Some(VelocitySet { velocities, subjects, decays, repeatability: self.repeatability })
     }
 
     /// Returns the velocities of a set, by its number; `None` if only their moments are known.
@@ -206,6 +215,11 @@ impl Data {
     /// if only their moments are known.
     pub fn subjects(&self, set: usize) -> Option<&[u32]> {
         self.set(set)?.subjects
+    }
+
+    /// Returns whether decays were measured.
+    pub fn has_decays(&self) -> bool {
+        self.set(0).is_some_and(|set| set.decays.is_some())
     }
 
     /// Returns the instrument's own standard deviation, m/s; 0 if it is not known.
@@ -225,7 +239,7 @@ impl Data {
 impl<'a> VelocitySet<'a> {
     /// Creates a set of independent velocities, m/s, without scatter of the instrument.
     pub fn independent(velocities: &'a [f64]) -> Self {
-        Self { velocities, subjects: None, repeatability: 0.0 }
+        Self { velocities, subjects: None, decays: None, repeatability: 0.0 }
     }
 
     /// Returns the number of independent parts: of subjects, or else of velocities.

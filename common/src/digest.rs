@@ -1,13 +1,15 @@
 //! The digest that identifies a job's result to the bit.
 
 use crate::outcome::{Outcome, encode};
+use crate::outcomes::Outcomes;
 use crate::parameters::Point;
 
 /// BLAKE3 over the evaluations of a search's path, in order.
 ///
 /// Each evaluation adds its parameters (seven, and those of the setup that are searched), then for
-/// each index the code byte of the outcome (0 = success) and its velocity in m/s (0 on failure); every
-/// float as 8 bytes little-endian, nothing between them. The digest depends on these numbers alone: not
+/// each index the code byte of the outcome (0 = success) and its velocity in m/s (0 on failure); then,
+/// if the job has measured decays, for each index the decay in dB/cm (0 on failure); every float as 8
+/// bytes little-endian, nothing between them. The digest depends on these numbers alone: not
 /// on names, times or the program's version.
 #[derive(Debug, Clone, Default)]
 pub struct PathDigest(blake3::Hasher);
@@ -23,7 +25,16 @@ impl PathDigest {
         Self::default()
     }
 
-    /// Appends one evaluation: its point and its outcomes in index order.
+    /// Appends one evaluation: its point and its outcomes in index order, with the decays that they
+    /// have.
+    pub fn add(&mut self, point: &Point, outcomes: &Outcomes) {
+        self.add_evaluation(point, outcomes);
+        for decay in outcomes.decays().into_iter().flatten() {
+            self.0.update(&decay.to_le_bytes());
+        }
+    }
+
+    /// Appends one evaluation without decays: its point and its outcomes in index order.
     pub fn add_evaluation(&mut self, point: &Point, outcomes: &[Outcome]) {
         for (_, value) in point.given() {
             self.0.update(&value.to_le_bytes());
@@ -73,6 +84,24 @@ mod tests {
         digest.add_evaluation(&SECOND, &SECOND_OUTCOMES);
         let two = "052c5ecdc171f97a61c243565215e3fe47e7cf62117709159a3c475b3628b3a5";
         assert_eq!(digest.finish(), two);
+    }
+
+    #[test]
+    fn decays_follow_the_outcomes() {
+        let of = |decays: Option<[f64; 3]>| {
+            let mut digest = PathDigest::new();
+            let outcomes = Outcomes::from(FIRST_OUTCOMES);
+            digest.add(&FIRST, &outcomes.with_decays(decays.map(|decays| decays.into())));
+            digest.finish()
+        };
+        let mut digest = PathDigest::new();
+        digest.add_evaluation(&FIRST, &FIRST_OUTCOMES);
+        assert_eq!(of(None), digest.finish());
+        for decay in [4.625_f64, 0.0, -0.5] {
+            digest.0.update(&decay.to_le_bytes());
+        }
+        assert_eq!(of(Some([4.625, 0.0, -0.5])), digest.finish());
+        assert_ne!(of(Some([4.625, 0.0, 0.5])), digest.finish());
     }
 
     #[test]

@@ -21,6 +21,7 @@
 
 mod agreement;
 mod conclusions;
+mod decay;
 mod jacobian;
 mod linear;
 mod noise;
@@ -32,16 +33,17 @@ mod tests;
 mod weights;
 
 use crate::job::{JobSpecification, Objective};
+use crate::moments::log_ratios;
 use crate::results::{BestPoint, Evaluation};
 use crate::statistics::{LikelihoodFit, likelihood_fit};
 
-use self::jacobian::log_ratios;
 use self::linear::Linear;
-use self::quantities::{LogarithmicEnds, Quantities};
+use self::quantities::{AllNoise, LogarithmicEnds, Quantities};
 
-use self::agreement::compared;
 pub use self::agreement::{Agreement, agreement};
+use self::agreement::{compared, off_decay};
 pub use self::conclusions::{below_noise_from, meaning};
+pub use self::decay::{DECAY_PARTS_MIN, DecayWeights};
 pub use self::jacobian::{Jacobian, jacobian};
 pub use self::noise::{DataNoise, Noise, data_noise, noise};
 pub(crate) use self::noise::{PARTS_MIN, student_quantile};
@@ -66,7 +68,8 @@ pub fn inference(
     let estimate = best.velocity?;
     let data = specification.data.as_ref()?;
     let jacobian = jacobian(specification, set, best, history)?;
-    let linear = Linear::from_jacobian(&jacobian);
+    let weights = if jacobian.has_decays { DecayWeights::of_data(data, set) } else { None };
+    let linear = Linear::from_jacobian(&jacobian, weights.as_ref());
     let likely = by_likelihood(specification, set, best);
     let ends = if likely.is_none() { LogarithmicEnds::of_data(data, set) } else { None };
     let of_moments = noise(data, set, &estimate);
@@ -75,15 +78,17 @@ pub fn inference(
         None => (of_moments, log_ratios(data.moments(set), estimate.moments)),
     };
     let quantile = noise.quantile();
+    let off = best.decay.and_then(|decay| off_decay(data, set, &decay));
     let Agreement { matched, held, .. } =
-        compared(specification, set, &best.point, residual, &noise);
+        compared(specification, set, &best.point, (residual, off), &noise);
+    let all = AllNoise::new(&noise, weights.as_ref(), best.decay.as_ref());
     let context = Quantities {
         specification,
         best,
         linear: &linear,
-        noise: &noise,
+        noise: &all,
         quantile,
-        residual,
+        residual: [residual[0], residual[1], off.map_or(0.0, |[difference, _]| difference)],
         ends,
         known: matched && !held && linear.undetermined.is_empty() && is_enough(&noise),
     };

@@ -178,6 +178,11 @@ impl JobSpecification {
         RunSettings { random, monte_carlo, objective, search }
     }
 
+    /// Returns whether decays were measured, so that each realization's decay is a part of the job.
+    pub fn has_decays(&self) -> bool {
+        self.data.as_ref().is_some_and(Data::has_decays)
+    }
+
     /// Returns the range of one parameter.
     pub fn range(&self, parameter: Parameter) -> Range {
         self.parameters[parameter as usize]

@@ -35,6 +35,7 @@ pub mod moments;
 mod monte_carlo;
 pub mod origin;
 pub mod outcome;
+pub mod outcomes;
 pub mod parameters;
 pub mod plausible;
 pub mod posterior;

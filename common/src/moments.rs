@@ -17,6 +17,14 @@ impl Moments {
     pub const UNKNOWN: Self = Self { mean: f64::NAN, coefficient_of_variation: f64::NAN };
 }
 
+/// Returns the logarithms of the ratios of both moments to those of `base`.
+pub(crate) fn log_ratios(moments: Moments, base: Moments) -> [f64; 2] {
+    [
+        libm::log(moments.mean / base.mean),
+        libm::log(moments.coefficient_of_variation / base.coefficient_of_variation),
+    ]
+}
+
 /// Moments of a Monte Carlo sample with their standard errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
@@ -37,6 +45,17 @@ impl Estimate {
             error.coefficient_of_variation / moments.coefficient_of_variation,
         ]
     }
+}
+
+/// Mean and scatter of decays along the array, with the error of the mean.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DecayEstimate {
+    /// Mean, dB/cm.
+    pub mean: f64,
+    /// Standard deviation of the decays, with division by their number, dB/cm.
+    pub standard_deviation: f64,
+    /// Standard error of the mean, dB/cm.
+    pub standard_error: f64,
 }
 
 /// Estimated relative errors, by discretisation, of the velocities of a set of realizations.

@@ -83,21 +83,36 @@ pub struct RealizationResult {
     pub outcome: Outcome,
     /// Estimated relative error of the velocity due to discretisation, ≥ 0; 0 on failure.
     pub estimated_error: f64,
+    /// Decay along the array, dB/cm, finite; 0 on failure, and for a job without measured decays.
+    pub decay: f64,
 }
 
 impl RealizationResult {
     /// Returns a realization without a velocity.
     pub fn failed(kind: FailureKind) -> Self {
-        Self { outcome: Err(kind), estimated_error: 0.0 }
+        Self { outcome: Err(kind), estimated_error: 0.0, decay: 0.0 }
     }
 
     /// Returns whether the estimated error is valid: finite and not negative for a velocity, exactly 0
     /// for a failure.
-    pub fn is_consistent(&self) -> bool {
+    pub fn has_valid_error(&self) -> bool {
         match self.outcome {
             Ok(_) => self.estimated_error.is_finite() && self.estimated_error >= 0.0,
             Err(_) => self.estimated_error.to_bits() == 0,
         }
+    }
+
+    /// Returns whether the decay is valid: finite for a velocity, exactly 0 for a failure.
+    pub fn has_valid_decay(&self) -> bool {
+        match self.outcome {
+            Ok(_) => self.decay.is_finite(),
+            Err(_) => self.decay.to_bits() == 0,
+        }
+    }
+
+    /// Returns whether estimated error and decay are valid.
+    pub fn is_consistent(&self) -> bool {
+        self.has_valid_error() && self.has_valid_decay()
     }
 }
 
@@ -171,7 +186,7 @@ mod tests {
     #[test]
     fn an_estimate_is_finite_and_a_failure_has_none() {
         let consistent = |outcome, estimated_error| {
-            RealizationResult { outcome, estimated_error }.is_consistent()
+            RealizationResult { outcome, estimated_error, decay: 0.0 }.is_consistent()
         };
         assert!(consistent(Ok(3900.0), 0.0) && consistent(Ok(3900.0), 2e-5));
         assert!(RealizationResult::failed(FailureKind::NoArrival).is_consistent());
@@ -181,6 +196,17 @@ mod tests {
         for estimate in [-0.0, 1e-5, f64::NAN] {
             assert!(!consistent(Err(FailureKind::NoArrival), estimate), "{estimate}");
         }
+    }
+
+    #[test]
+    fn a_decay_is_finite_and_a_failure_has_none() {
+        let valid = |outcome, decay| {
+            RealizationResult { outcome, estimated_error: 0.0, decay }.has_valid_decay()
+        };
+        assert!(valid(Ok(3900.0), 4.6) && valid(Ok(3900.0), -0.3) && valid(Ok(3900.0), 0.0));
+        assert!(!valid(Ok(3900.0), f64::NAN) && !valid(Ok(3900.0), f64::INFINITY));
+        let failed = Err(FailureKind::NoArrival);
+        assert!(valid(failed, 0.0) && !valid(failed, -0.0) && !valid(failed, 4.6));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::sampling::NominalSampling;
 use crate::settings::{Picking, SolverSettings};
 use crate::version::Program;
 
-pub use crate::moments::{Estimate, EstimatedError, Moments};
+pub use crate::moments::{DecayEstimate, Estimate, EstimatedError, Moments};
 
 /// Final status of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -125,6 +125,8 @@ pub struct Evaluation {
     /// Moments over the successes, unless there are none. For an evaluation that measures a
     /// derivative, also `None` if other realizations failed than at the best point.
     pub moments: Option<Moments>,
+    /// Mean decay over the successes, dB/cm, where there are moments and decays were measured.
+    pub decay: Option<f64>,
     /// Cost; infinite at an infeasible point; `None` for a propagation.
     pub cost: Option<f64>,
     /// Failed realizations by kind.
@@ -164,6 +166,8 @@ impl PointMeaning {
 pub struct DataSummary {
     /// Moments of the data.
     pub moments: Moments,
+    /// Mean of the measured decays, with its error by their scatter; `None` if none were measured.
+    pub decay: Option<DecayEstimate>,
     /// Number of velocities; `None` if only their moments are known.
     pub count: Option<u64>,
     /// Confidence intervals of the moments of their law; `None` if only the moments are known, or
@@ -270,6 +274,9 @@ pub struct BestPoint {
     pub below_noise_from: Option<u64>,
     /// Its moments with standard errors, unless every realization failed.
     pub velocity: Option<Estimate>,
+    /// The mean of its decays, with its error by sampling; `None` if no decays were measured, or every
+    /// realization failed.
+    pub decay: Option<DecayEstimate>,
     /// Change of the moments if the failed realizations had the velocities expected from their
     /// tensors; `None` if that is unknown.
     pub failure_bias: Option<Moments>,

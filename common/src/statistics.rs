@@ -7,6 +7,7 @@
 mod blocks;
 mod central;
 mod controlled;
+mod decay;
 mod failure_bias;
 mod kernel_density;
 mod likelihood;
@@ -16,12 +17,14 @@ mod sum;
 use crate::job::{MonteCarlo, Sampling};
 use crate::moments::{Estimate, Moments};
 use crate::outcome::Outcome;
+use crate::outcomes::Outcomes;
 use crate::parameters::Point;
 
 use self::blocks::DoublingFactors;
 use self::central::{Central, central};
 use self::controlled::Controlled;
 
+pub use self::decay::{covariance_with_decay, decay_estimate, mean_decay, measured_decay};
 pub use self::failure_bias::failure_bias;
 pub use self::likelihood::{LikelihoodFit, likelihood_cost, likelihood_error, likelihood_fit};
 pub use self::measured::{covariance_of_logarithms, without_repeatability};
@@ -82,11 +85,19 @@ pub fn cost(data: Moments, model: Moments) -> f64 {
 pub struct PointStatistics {
     /// Moments over the successes, unless there are none.
     pub moments: Option<Moments>,
+    /// Mean decay over the successes, dB/cm, where there are moments and decays were measured.
+    pub decay: Option<f64>,
     /// Whether at most the accepted fraction of realizations failed, and at least one succeeded.
     pub feasible: bool,
 }
 
 impl PointStatistics {
+    /// Same as [`Self::from_outcomes`], with the mean of the decays.
+    pub fn new(monte_carlo: &MonteCarlo, point: &Point, outcomes: &Outcomes) -> Self {
+        let of_velocities = Self::from_outcomes(monte_carlo, point, outcomes);
+        Self { decay: mean_decay(outcomes), ..of_velocities }
+    }
+
     /// Computes moments and feasibility from the outcomes of every index of an evaluation at
     /// `point`. It is feasible if at least one realization succeeded and at most
     /// `max_failed_fraction` of all failed.
@@ -95,7 +106,7 @@ impl PointStatistics {
         let moments =
             Sample::from_outcomes(monte_carlo, point, outcomes).map(|sample| sample.moments());
         let within = failed as f64 / outcomes.len() as f64 <= monte_carlo.max_failed_fraction;
-        Self { moments, feasible: moments.is_some() && within }
+        Self { moments, decay: None, feasible: moments.is_some() && within }
     }
 
     /// Returns the cost against the data's moments: infinite at an infeasible point, never NaN.

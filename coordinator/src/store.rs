@@ -18,7 +18,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::outcome::{Outcome, RealizationResult};
+use osteon_common::outcome::RealizationResult;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::results::{EstimatedError, Evaluation, Moments};
 use osteon_common::version::Program;
@@ -60,7 +61,7 @@ pub struct EvaluationRecord {
     /// The point.
     pub point: Point,
     /// Outcomes in index order.
-    pub outcomes: Arc<[Outcome]>,
+    pub outcomes: Outcomes,
     /// Estimated errors of the successes, unless there are none.
     pub estimated_error: Option<EstimatedError>,
     /// All workers whose answers are in it.

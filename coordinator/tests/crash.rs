@@ -13,6 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::version;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::core::effect::{Answer, Effect};
@@ -68,7 +69,7 @@ fn evaluations_of_other_numerics_are_computed_again() {
     let mut search = Search::new(Arc::new(specification.clone()));
     for number in 0..3 {
         let Step::Evaluate(point) = search.ask() else { panic!("done") };
-        let outcomes: Arc<[_]> = [Ok(4000.0 + number as f64); 20].into();
+        let outcomes: Outcomes = [Ok(4000.0 + number as f64); 20].into();
         let record = EvaluationRecord {
             job: JobId(1),
             number,

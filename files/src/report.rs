@@ -28,7 +28,7 @@ pub use self::conclusions::{
 };
 pub use self::error::{BestPointError, ReadError, listed};
 pub use self::identification::{Group, Identification, SearchSettings};
-pub use self::moments::{Data, Moment, MomentIntervals, Moments, Velocity};
+pub use self::moments::{Data, Moment, MomentIntervals, MomentSlopes, Moments, Velocity};
 pub use self::point::MeanModel;
 pub use self::posterior::{PosteriorReport, QuantityPosterior};
 pub use self::propagation::Propagation;

@@ -21,12 +21,14 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
     let parameters = parameters.join(",");
     let names: Vec<&str> = specification.data.iter().flat_map(Data::names).collect();
     let several = specification.search.starts > 1;
-    let mut out = format!("evaluation,{parameters},mean,coefficient_of_variation,cost,failures");
+    let decay = if specification.has_decays() { "decay," } else { "" };
+    let mut out =
+        format!("evaluation,{parameters},mean,coefficient_of_variation,{decay}cost,failures");
     out.push_str(if several { ",start" } else { "" });
     out.push_str(if names.is_empty() { "\n" } else { ",group\n" });
     for evaluation in evaluations.iter().filter(|evaluation| evaluation.role.is_of_search()) {
         // Writing to a string does not fail.
-        let _infallible = history_row(&mut out, evaluation);
+        let _infallible = history_row(&mut out, evaluation, specification.has_decays());
         if several {
             let _infallible = write!(out, ",{}", evaluation.role.start);
         }
@@ -63,17 +65,18 @@ pub(crate) fn field(text: &str) -> String {
 /// Characters that begin a formula, or are skipped before one (OWASP, "CSV Injection").
 const FORMULA: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
 
-fn history_row(out: &mut String, evaluation: &Evaluation) -> fmt::Result {
+fn history_row(out: &mut String, evaluation: &Evaluation, has_decays: bool) -> fmt::Result {
     write!(out, "{}", evaluation.number)?;
     for (_, value) in evaluation.point.given() {
         write!(out, ",{value:?}")?;
     }
     let moments = evaluation.moments;
-    for value in [
+    let moments = [
         moments.map(|moments| moments.mean),
         moments.map(|moments| moments.coefficient_of_variation),
-        evaluation.cost,
-    ] {
+    ];
+    let decay = has_decays.then_some(evaluation.decay);
+    for value in moments.into_iter().chain(decay).chain([evaluation.cost]) {
         match value {
             Some(value) => write!(out, ",{value:?}")?,
             None => out.push(','),

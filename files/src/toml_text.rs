@@ -125,8 +125,8 @@ fn data(out: &mut String, data: &Data) -> fmt::Result {
         writeln!(out, "\n[data]  # m/s")?;
     }
     match &data.measurements {
-        Measurements::Velocities { velocities: measured, subjects } => {
-            set(out, measured, subjects.as_deref())?;
+        Measurements::Velocities { velocities: measured, subjects, decays } => {
+            set(out, measured, subjects.as_deref(), decays.as_deref())?;
         }
         Measurements::Groups(_) => {}
         Measurements::Moments { mean, coefficient_of_variation, count } => {
@@ -146,7 +146,10 @@ fn data(out: &mut String, data: &Data) -> fmt::Result {
 /// Writes groups in their order: as lists of one table, or, if any has more than velocities, each as a
 /// table.
 fn groups(out: &mut String, groups: &[Group]) -> fmt::Result {
-    if groups.iter().any(|group| group.subjects.is_some() || !group.known.is_empty()) {
+    let has_more = |group: &Group| {
+        group.subjects.is_some() || group.decays.is_some() || !group.known.is_empty()
+    };
+    if groups.iter().any(has_more) {
         return groups.iter().try_for_each(|group| {
             writeln!(out, "\n[data.groups.{}]  # m/s", quoted(&group.name))?;
             for (parameter, value) in group.known.given() {
@@ -156,16 +159,26 @@ fn groups(out: &mut String, groups: &[Group]) -> fmt::Result {
                     unit => writeln!(out, "  # {unit}")?,
                 }
             }
-            set(out, &group.velocities, group.subjects.as_deref())
+            set(out, &group.velocities, group.subjects.as_deref(), group.decays.as_deref())
         });
     }
     writeln!(out, "\n[data.groups]  # m/s")?;
     groups.iter().try_for_each(|group| list(out, &quoted(&group.name), &group.velocities))
 }
 
-fn set(out: &mut String, velocities: &[f64], subjects: Option<&[u32]>) -> fmt::Result {
+fn set(
+    out: &mut String,
+    velocities: &[f64],
+    subjects: Option<&[u32]>,
+    decays: Option<&[f64]>,
+) -> fmt::Result {
     list(out, "velocities", velocities)?;
-    subjects.map_or(Ok(()), |subjects| list(out, "subjects", subjects))
+    subjects.map_or(Ok(()), |subjects| list(out, "subjects", subjects))?;
+    // A table of groups has the unit of velocities in its head.
+    decays.map_or(Ok(()), |decays| {
+        writeln!(out, "# dB/cm")?;
+        list(out, "decays", decays)
+    })
 }
 
 fn list(out: &mut String, key: &str, numbers: &[impl fmt::Debug]) -> fmt::Result {

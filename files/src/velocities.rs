@@ -209,6 +209,8 @@ struct CollectedGroup {
     subjects: Vec<u32>,
     /// Numbers of the subjects, by their names.
     numbers: BTreeMap<String, u32>,
+    /// Decay of each velocity; empty if there is no such column.
+    decays: Vec<f64>,
     /// Quantities that are known of the group.
     known: [Option<f64>; Parameter::OF_SETUP.len()],
 }
@@ -251,6 +253,7 @@ impl CollectedVelocities {
         };
         let group = &mut self.groups[place];
         group.velocities.push(row.velocity);
+        group.decays.extend(row.decay);
         // The limit on a file's bytes keeps the number of lines far below this.
         group.lines.push(u32::try_from(line).unwrap_or(u32::MAX));
         if let Some(subject) = row.subject.filter(|_| !self.is_index) {
@@ -270,10 +273,12 @@ impl CollectedVelocities {
             lines: Vec::with_capacity(self.groups.len()),
         };
         let mut measured = Measured { data: Vec::with_capacity(self.groups.len()), origin };
-        for CollectedGroup { name, velocities, lines, subjects, known, .. } in self.groups {
+        for CollectedGroup { name, velocities, lines, subjects, decays, known, .. } in self.groups {
             let subjects = self.has_subjects.then_some(subjects);
             let known = KnownQuantities::new(known);
-            measured.data.push(Group { name, velocities, subjects, known });
+            // Rows have a decay each, or none has.
+            let decays = (!decays.is_empty()).then_some(decays);
+            measured.data.push(Group { name, velocities, subjects, decays, known });
             measured.origin.lines.push(lines);
         }
         measured
@@ -283,7 +288,8 @@ impl CollectedVelocities {
 impl CollectedGroup {
     fn new(name: String, known: [Option<f64>; Parameter::OF_SETUP.len()]) -> Self {
         let (velocities, lines, subjects) = (Vec::new(), Vec::new(), Vec::new());
-        Self { name, velocities, lines, subjects, numbers: BTreeMap::new(), known }
+        let (decays, numbers) = (Vec::new(), BTreeMap::new());
+        Self { name, velocities, lines, subjects, decays, numbers, known }
     }
 
     /// Adds the subject of a velocity; returns whether it is a new one.

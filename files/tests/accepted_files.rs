@@ -383,6 +383,28 @@ fn as_json(text: &str) -> String {
     serde_json::to_string(&table).unwrap()
 }
 
+/// The decays of all groups are inlined, and χ² is the default.
+#[test]
+fn decays_are_inlined() {
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    let list = |start: u32, step: u32| -> Vec<u32> {
+        (0..10).map(|k| start + step * k * k % 101).collect()
+    };
+    let group = |name: &str, start: u32| {
+        let (velocities, decays) = (list(start, 7), list(4, 13));
+        format!("groups.{name} = {{ velocities = {velocities:?}, decays = {decays:?} }}\n")
+    };
+    let data = group("b", 3900) + &group("a", 3950);
+    let text = include_str!("files/job.toml").replace(given, &data);
+    let text = text.replace("kind = \"moments\"", "kind = \"chi_square\"");
+    let read = job(&text, Format::Toml, JobKind::Identification);
+    assert!(read.has_decays());
+    let written = job_file::to_toml(&read);
+    let expected = "# dB/cm\ndecays = [\n    4.0, 17.0, 56.0, 20.0, 10.0, 26.0,\n    68.0, 35.0, 28.0, 47.0,\n]\n";
+    assert!(written.contains(expected), "{written}");
+    assert_eq!(job(&written, Format::Toml, JobKind::Identification), read);
+}
+
 /// Subjects are numbered anew, and the canonical text is read as it is written.
 #[test]
 fn what_is_known_of_the_data_is_inlined() {

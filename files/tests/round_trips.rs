@@ -171,7 +171,9 @@ fn with_noise(mut data: Data, (known, few, part): (bool, usize, f64)) -> Data {
     });
     data.repeatability = part * smallest.fold(f64::INFINITY, f64::min);
     match &mut data.measurements {
-        Measurements::Velocities { velocities, subjects } => *subjects = numbers(velocities.len()),
+        Measurements::Velocities { velocities, subjects, .. } => {
+            *subjects = numbers(velocities.len());
+        }
         Measurements::Groups(groups) => {
             for group in groups.iter_mut().step_by(2) {
                 group.subjects = numbers(group.velocities.len());

@@ -22,6 +22,11 @@ fn read_as(bytes: &[u8], more: &str) -> Result<Option<Data>, String> {
     let given = "velocities = [3900.5, 4000, 3950.25]";
     let text = include_str!("files/job.toml")
         .replace(given, &format!("velocities = \"data/v.csv\"\n{more}"));
+    // Decays need χ².
+    let text = match more.contains("decay") {
+        true => text.replace("kind = \"moments\"", "kind = \"chi_square\""),
+        false => text,
+    };
     match job_file::parse(&text, Format::Toml, directory.path(), JobKind::Identification) {
         Ok(job) => Ok(job.data),
         Err(error) => Err(error.to_string().replace(&*directory.path().to_string_lossy(), "DIR")),
@@ -95,6 +100,32 @@ fn subjects_are_numbered_in_each_group() {
     ] {
         assert_eq!(subjects(more), expected, "{more}");
     }
+}
+
+#[test]
+fn decays_are_a_column() {
+    let row = |k: u32| (3900.0 + f64::from(k * k), 4.5 + f64::from(k * 7 % 10) / 10.0);
+    let rows: Vec<(f64, f64)> = (0..10).map(row).collect();
+    let lines: String = rows.iter().map(|(v, d)| format!("{d:?},{v:?}\n")).collect();
+    let more = "decay = \"dB/cm\"";
+    let data = read_as(format!("dB/cm,velocity\n{lines}").as_bytes(), more).unwrap().unwrap();
+    let (velocities, decays): (Vec<f64>, Vec<f64>) = rows.into_iter().unzip();
+    let found = data.set(0).unwrap();
+    assert_eq!((found.velocities, found.decays), (&velocities[..], Some(&decays[..])));
+    let check = |rows: &str, expected: &str| {
+        let text = format!("dB/cm,velocity\n{rows}{lines}");
+        let message = read_as(text.as_bytes(), more).unwrap_err();
+        assert!(message.contains(expected), "{message}");
+    };
+    let line = "data.velocities: DIR/data/v.csv, line 2: `dB/cm` is";
+    let line = line.replace('`', "");
+    for wrong in ["", "x", "nan", "-100.5", "462"] {
+        check(&format!("{wrong},3900\n"), &format!("{line} {wrong:?}; it must be the decay"));
+    }
+    let columns = read_as(b"d,velocity\n4.5,3900\n4.6,3910\n", more).unwrap_err();
+    assert!(columns.contains("no column `dB/cm`; the header has `d`, `velocity`"), "{columns}");
+    let few = read_as(b"dB/cm,velocity\n4.5,3900\n4.6,3910\n", more).unwrap_err();
+    assert!(few.contains("data.decay: there are 2 velocities; with decays at least 10"), "{few}");
 }
 
 #[test]

@@ -56,16 +56,21 @@ pub fn answer_to_message(
 ) -> v1::BatchResult {
     let (codes, velocities) = solved.iter().map(|solved| outcome::encode(solved.outcome)).unzip();
     let estimated_errors = solved.iter().map(|solved| solved.estimated_error).collect();
-    v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors }
+    let has_decays = solved.iter().any(|solved| solved.decay.to_bits() != 0);
+    let decays = match has_decays {
+        true => solved.iter().map(|solved| solved.decay).collect(),
+        false => Vec::new(),
+    };
+    v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors, decays }
 }
 
 /// Returns the realizations of an answer, in index order.
 ///
 /// # Errors
 /// If the lengths differ, if a code and a velocity do not encode an outcome, or if an estimated
-/// error is not allowed for its outcome.
+/// error or a decay is not allowed for its outcome. Without decays, each is 0.
 pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationResult>, Malformed> {
-    let v1::BatchResult { codes, velocities, estimated_errors, .. } = message;
+    let v1::BatchResult { codes, velocities, estimated_errors, decays, .. } = message;
     let expected = codes.len();
     for (field, found) in
         [("velocities", velocities.len()), ("estimated_errors", estimated_errors.len())]
@@ -74,14 +79,23 @@ pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationR
             return Err(Malformed::WrongLength { field, found, expected });
         }
     }
+    let has_decays = !decays.is_empty();
+    if has_decays && decays.len() != expected {
+        let (field, found) = ("decays", decays.len());
+        return Err(Malformed::WrongLength { field, found, expected });
+    }
     let rows = codes.iter().zip(velocities).zip(estimated_errors).enumerate();
     let mut results = Vec::with_capacity(expected);
     for (index, ((&code, &velocity), &estimated_error)) in rows {
         let outcome = outcome::decode(code, velocity);
         let outcome = outcome.ok_or(Malformed::Outcome { index, code, velocity })?;
-        let solved = RealizationResult { outcome, estimated_error };
-        if !solved.is_consistent() {
+        let decay = if has_decays { decays[index] } else { 0.0 };
+        let solved = RealizationResult { outcome, estimated_error, decay };
+        if !solved.has_valid_error() {
             return Err(Malformed::EstimatedError { index, value: estimated_error });
+        }
+        if !solved.has_valid_decay() {
+            return Err(Malformed::Decay { index, value: decay });
         }
         results.push(solved);
     }
@@ -107,6 +121,7 @@ mod tests {
             setup: Setup::default(),
             point: Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
             random: RandomQuantities::default(),
+            with_decays: false,
             germs: GermSource::streams(1),
         })
     }
@@ -131,9 +146,9 @@ mod tests {
     #[test]
     fn answers_survive_the_wire_and_unsound_ones_do_not() {
         let solved = [
-            RealizationResult { outcome: Ok(3900.5), estimated_error: 2e-5 },
+            RealizationResult { outcome: Ok(3900.5), estimated_error: 2e-5, decay: 0.0 },
             RealizationResult::failed(FailureKind::NoArrival),
-            RealizationResult { outcome: Ok(3901.5), estimated_error: 0.0 },
+            RealizationResult { outcome: Ok(3901.5), estimated_error: 0.0, decay: 0.0 },
         ];
         let message = answer_to_message(7, &solved, 0.25);
         assert_eq!((message.batch, message.elapsed_s), (7, 0.25));
@@ -155,6 +170,32 @@ mod tests {
         assert_eq!(infinite, unsound(2, f64::INFINITY));
         let wrong_code = refused(|answer| answer.codes[0] = 1);
         assert!(matches!(wrong_code, Malformed::Outcome { index: 0, .. }));
+    }
+
+    #[test]
+    fn decays_survive_the_wire_and_none_take_no_bytes() {
+        let solved = [
+            RealizationResult { outcome: Ok(3900.5), estimated_error: 2e-5, decay: 4.625 },
+            RealizationResult::failed(FailureKind::NoArrival),
+            RealizationResult { outcome: Ok(3901.5), estimated_error: 0.0, decay: -0.5 },
+        ];
+        let message = answer_to_message(7, &solved, 0.25);
+        assert_eq!(message.decays, [4.625, 0.0, -0.5]);
+        assert_eq!(answer_from_message(&message).unwrap(), solved);
+        let without = solved.map(|one| RealizationResult { decay: 0.0, ..one });
+        assert_eq!(answer_to_message(7, &without, 0.25).decays, [0.0; 0]);
+        let refused = |change: fn(&mut v1::BatchResult)| {
+            let mut message = message.clone();
+            change(&mut message);
+            answer_from_message(&message).unwrap_err()
+        };
+        let (field, found, expected) = ("decays", 2, 3);
+        let short = refused(|answer| answer.decays.truncate(2));
+        assert_eq!(short, Malformed::WrongLength { field, found, expected });
+        let of_failure = refused(|answer| answer.decays[1] = 4.6);
+        assert_eq!(of_failure, Malformed::Decay { index: 1, value: 4.6 });
+        let infinite = refused(|answer| answer.decays[2] = f64::INFINITY);
+        assert_eq!(infinite, Malformed::Decay { index: 2, value: f64::INFINITY });
     }
 
     #[test]

@@ -89,6 +89,7 @@ fn sensitivity_to_message(one: &Sensitivity) -> v1::Sensitivity {
         parameter: PARAMETER.number(one.parameter),
         mean: Some(one.mean),
         coefficient_of_variation: Some(one.coefficient_of_variation),
+        decay: one.decay,
     }
 }
 
@@ -98,6 +99,7 @@ fn sensitivity_from_message(message: &v1::Sensitivity) -> Result<Sensitivity, Ma
         parameter: parameter(message.parameter)?,
         mean: present(message.mean, "mean")?,
         coefficient_of_variation: present(variation, "coefficient_of_variation")?,
+        decay: message.decay,
     })
 }
 

@@ -5,7 +5,9 @@ use osteon_common::results::DataSummary;
 
 use crate::conclusions::interval_from_message;
 use crate::malformed::Malformed;
-use crate::results::{moments_from_message, moments_to_message};
+use crate::results::{
+    decay_from_message, decay_to_message, moments_from_message, moments_to_message,
+};
 use crate::v1;
 
 /// Returns the message of a summary.
@@ -25,6 +27,7 @@ pub(crate) fn data_to_message(data: &DataSummary) -> v1::DataSummary {
         outliers: data.outliers.iter().map(outlier_to_message).collect(),
         outlier_count: data.outlier_count,
         rounding: data.rounding,
+        decay: data.decay.map(decay_to_message),
     }
 }
 
@@ -43,6 +46,7 @@ pub(crate) fn data_from_message(message: &v1::DataSummary) -> Result<DataSummary
     };
     Ok(DataSummary {
         moments: moments_from_message(moments),
+        decay: message.decay.map(decay_from_message),
         count: message.count,
         intervals: message.intervals.as_ref().map(intervals).transpose()?,
         outliers: message.outliers.iter().map(outlier_from_message).collect(),

@@ -29,6 +29,8 @@ pub struct EvaluationInput {
     pub germs: GermSource,
     /// Scatter of quantities of the setup.
     pub random: RandomQuantities,
+    /// Whether the decay of each realization is asked for.
+    pub with_decays: bool,
 }
 
 /// Returns the message of an evaluation.
@@ -49,6 +51,7 @@ pub fn to_message(evaluation: &EvaluationInput) -> v1::Evaluation {
         sampling: SAMPLING.number(sampling),
         points_per_scramble: points,
         random: random_to_message(&evaluation.random),
+        with_decays: evaluation.with_decays,
     }
 }
 
@@ -73,7 +76,8 @@ pub fn from_message(message: &v1::Evaluation) -> Result<EvaluationInput, Malform
     let sampling = SAMPLING.required(message.sampling, "sampling")?;
     violations.into_result(()).map_err(Malformed::InvalidSetup)?;
     let germs = GermSource { seed: message.seed, scheme: scheme(message, sampling)? };
-    Ok(EvaluationInput { id: message.evaluation, setup, point, germs, random })
+    let with_decays = message.with_decays;
+    Ok(EvaluationInput { id: message.evaluation, setup, point, germs, random, with_decays })
 }
 
 /// Returns the scheme by which germs are generated from the seed.
@@ -142,6 +146,7 @@ mod tests {
         point: Point::of_bone([density, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
         random: RandomQuantities::default(),
         germs: GermSource::streams(seed),
+        with_decays: false,
     };
 
     properties! {
@@ -152,8 +157,10 @@ mod tests {
             seed in 0..=SEED_MAX,
             points in proptest::option::of(1..=REALIZATIONS_MAX),
             deviation in proptest::option::of(1e-6..1e-4),
+            with_decays in any::<bool>(),
         ) {
             let mut evaluation = EVALUATION(id, density, seed);
+            evaluation.with_decays = with_decays;
             evaluation.setup.layers.bone_thickness = thickness;
             evaluation.random.bone_thickness.standard_deviation = deviation;
             if let Some(points) = points {

@@ -64,6 +64,14 @@ pub enum Malformed {
         /// The number found.
         value: f64,
     },
+    /// A decay is not one that an outcome can have.
+    #[error("realization {index} has the decay {value}; it must be finite, and 0 on failure")]
+    Decay {
+        /// Index within the block.
+        index: usize,
+        /// The number found.
+        value: f64,
+    },
     /// The setup of an evaluation lacks a field, so its results would depend on the worker's
     /// defaults.
     #[error("the setup of an evaluation is incomplete")]

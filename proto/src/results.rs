@@ -7,8 +7,8 @@ use osteon_common::moments::KolmogorovTest;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::posterior::PosteriorDraw;
 use osteon_common::results::{
-    BestPoint, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupEnding, GroupResult,
-    JobResult, Moments,
+    BestPoint, DecayEstimate, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupEnding,
+    GroupResult, JobResult, Moments,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Picking, SolverSettings};
@@ -187,6 +187,7 @@ pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
         start: evaluation.role.start,
         varied: evaluation.role.varied.map(|parameter| PARAMETER.number(parameter)),
         posterior: evaluation.role.posterior,
+        decay: evaluation.decay,
     }
 }
 
@@ -204,6 +205,7 @@ pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation
         role,
         point: point_from_message(message.point.as_ref())?,
         moments: message.moments.as_ref().map(moments_from_message),
+        decay: message.decay,
         cost: message.cost,
         failures: failures_from_message(&message.failures)?,
         estimated_error: message.estimated_error.map(errors_from_message).transpose()?,
@@ -223,6 +225,7 @@ fn best_to_message(best: &BestPoint) -> v1::BestPoint {
         kolmogorov: best.kolmogorov.map(test_to_message),
         failures: failures_to_message(&best.failures),
         estimated_error: best.estimated_error.map(errors_to_message),
+        decay: best.decay.map(decay_to_message),
     }
 }
 
@@ -242,6 +245,7 @@ fn best_from_message(
         penalty: message.penalty,
         below_noise_from: message.below_noise_from,
         velocity,
+        decay: message.decay.map(decay_from_message),
         failure_bias: message.failure_bias.as_ref().map(moments_from_message),
         kolmogorov: message.kolmogorov.as_ref().map(test_from_message),
         failures: failures_from_message(&message.failures)?,
@@ -351,6 +355,16 @@ fn estimate_from_message(message: &v1::Estimate) -> Result<Estimate, Malformed> 
         standard_error: moments_from_message(standard_error),
         controlled: message.controlled,
     })
+}
+
+pub(crate) fn decay_to_message(decay: DecayEstimate) -> v1::DecayEstimate {
+    let DecayEstimate { mean, standard_deviation, standard_error } = decay;
+    v1::DecayEstimate { mean, standard_deviation, standard_error }
+}
+
+pub(crate) fn decay_from_message(message: v1::DecayEstimate) -> DecayEstimate {
+    let v1::DecayEstimate { mean, standard_deviation, standard_error } = message;
+    DecayEstimate { mean, standard_deviation, standard_error }
 }
 
 fn test_to_message(test: KolmogorovTest) -> v1::KolmogorovTest {

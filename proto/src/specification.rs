@@ -112,18 +112,23 @@ fn data_to_message(data: &Data) -> v1::Data {
     let message = v1::Data { repeatability: Some(data.repeatability), ..v1::Data::default() };
     let numbers = |subjects: &Option<Vec<u32>>| subjects.clone().unwrap_or_default();
     match &data.measurements {
-        Measurements::Velocities { velocities, subjects } => {
-            v1::Data { velocities: velocities.clone(), subjects: numbers(subjects), ..message }
-        }
+        Measurements::Velocities { velocities, subjects, decays } => v1::Data {
+            velocities: velocities.clone(),
+            subjects: numbers(subjects),
+            decays: decays.clone().unwrap_or_default(),
+            ..message
+        },
         Measurements::Groups(groups) => {
-            let group = |Group { name, velocities, subjects, known }: &Group| v1::VelocityGroup {
-                name: name.clone(),
-                velocities: velocities.clone(),
-                subjects: numbers(subjects),
-                bone_thickness: known.get(Parameter::BoneThickness),
-                bone_quality_factor: known.get(Parameter::BoneQualityFactor),
-                coupling_sound_speed: known.get(Parameter::CouplingSoundSpeed),
-            };
+            let group =
+                |Group { name, velocities, subjects, decays, known }: &Group| v1::VelocityGroup {
+                    name: name.clone(),
+                    velocities: velocities.clone(),
+                    subjects: numbers(subjects),
+                    decays: decays.clone().unwrap_or_default(),
+                    bone_thickness: known.get(Parameter::BoneThickness),
+                    bone_quality_factor: known.get(Parameter::BoneQualityFactor),
+                    coupling_sound_speed: known.get(Parameter::CouplingSoundSpeed),
+                };
             v1::Data { groups: groups.iter().map(group).collect(), ..message }
         }
         Measurements::Moments { mean, coefficient_of_variation, count } => v1::Data {
@@ -141,6 +146,9 @@ fn data_from_message(message: &v1::Data, violations: &mut Violations) -> Option<
     if !message.subjects.is_empty() && !has_velocities {
         violations.add("data.subjects", "has no velocities beside it; leave it out");
     }
+    if !message.decays.is_empty() && !has_velocities {
+        violations.add("data.decays", "has no velocities beside it; leave it out");
+    }
     if message.count.is_some() && !matches!(measurements, Measurements::Moments { .. }) {
         let message = "is the number of velocities behind `mean` and `coefficient_of_variation`, and \
                        they are not given; leave it out";
@@ -151,6 +159,7 @@ fn data_from_message(message: &v1::Data, violations: &mut Violations) -> Option<
 
 fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measurements> {
     let v1::Data { velocities, mean, coefficient_of_variation, groups, .. } = message;
+    let decays = |decays: &[f64]| (!decays.is_empty()).then(|| decays.to_vec());
     let numbers = |subjects: &[u32]| (!subjects.is_empty()).then(|| numbered(subjects));
     match (velocities.is_empty(), groups.is_empty(), (*mean, *coefficient_of_variation)) {
         (true, true, (Some(mean), Some(coefficient_of_variation))) => {
@@ -159,13 +168,15 @@ fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measu
         }
         (false, true, (None, None)) => {
             let subjects = numbers(&message.subjects);
-            Some(Measurements::Velocities { velocities: velocities.clone(), subjects })
+            let decays = decays(&message.decays);
+            Some(Measurements::Velocities { velocities: velocities.clone(), subjects, decays })
         }
         (true, false, (None, None)) => {
             let group = |group: &v1::VelocityGroup| Group {
                 name: group.name.clone(),
                 velocities: group.velocities.clone(),
                 subjects: numbers(&group.subjects),
+                decays: decays(&group.decays),
                 known: KnownQuantities::new([
                     group.bone_thickness,
                     group.bone_quality_factor,

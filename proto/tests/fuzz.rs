@@ -12,8 +12,8 @@ use osteon_common::moments::KolmogorovTest;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, RealizationResult};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{
-    BestPoint, DataSummary, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupResult,
-    JobFailure, JobResult, Moments, PointMeaning, Status as JobEnd,
+    BestPoint, DataSummary, DecayEstimate, Estimate, EstimatedError, Evaluation, EvaluationRole,
+    GroupResult, JobFailure, JobResult, Moments, PointMeaning, Status as JobEnd,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::version::Program;
@@ -77,7 +77,8 @@ fn check_specification(bytes: &[u8]) {
 /// The evaluation at the start of a job.
 fn evaluation_of(job: &JobSpecification) -> evaluation::EvaluationInput {
     let (setup, point, germs) = (job.setup, job.start(), job.monte_carlo.germs());
-    evaluation::EvaluationInput { id: 7, setup, point, germs, random: job.random }
+    let with_decays = job.has_decays();
+    evaluation::EvaluationInput { id: 7, setup, point, germs, random: job.random, with_decays }
 }
 
 fn evaluations() -> Vec<Vec<u8>> {
@@ -132,6 +133,7 @@ fn answers() -> Vec<Vec<u8>> {
     let solve = |outcome: Outcome| RealizationResult {
         outcome,
         estimated_error: if outcome.is_ok() { 2e-5 } else { 0.0 },
+        decay: 0.0,
     };
     let solved: Vec<_> = outcomes().into_iter().map(solve).collect();
     [1, 100]
@@ -199,6 +201,7 @@ fn history_of_two_starts() -> Vec<Evaluation> {
             role: EvaluationRole { start, varied, ..EvaluationRole::default() },
             point,
             moments: Some(moments(3950.0 - number as f64, 0.0103 + 1e-6 * number as f64)),
+            decay: Some(4.6),
             cost: Some(1e-11),
             failures: FailureCounts::default(),
             estimated_error: Some(EstimatedError { median: 1e-5, largest: 3e-5 }),
@@ -227,6 +230,7 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
             standard_error: moments(2.0, 1e-4),
             controlled: true,
         }),
+        decay: Some(DecayEstimate { mean: 4.6, standard_deviation: 0.4, standard_error: 0.01 }),
         failure_bias: Some(moments(-1.0, 1e-3)),
         kolmogorov: Some(KolmogorovTest { distance: 0.1, p_value: 0.3 }),
         failures: FailureCounts::from_outcomes(&outcomes()),

@@ -10,7 +10,8 @@ use osteon_common::data_statistics::{FittedMoments, kolmogorov_test};
 use osteon_common::digest::PathDigest;
 use osteon_common::inference::{Agreement, Conclusions, agreement, below_noise_from, meaning};
 use osteon_common::job::{Data, JobKind, JobSpecification, Objective};
-use osteon_common::outcome::{FailureCounts, Outcome};
+use osteon_common::outcome::FailureCounts;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::results::{
     BestPoint, DataSummary, EstimatedError, Evaluation, EvaluationRole, GroupEnding, GroupResult,
@@ -109,7 +110,7 @@ pub struct Search {
     digest: PathDigest,
     history: Vec<Evaluation>,
     /// Outcomes of the evaluation that a propagation's result needs.
-    outcomes: Option<Arc<[Outcome]>>,
+    outcomes: Option<Outcomes>,
     /// Assessment of the pending point, if it was made before its outcomes were passed to
     /// [`Search::tell`].
     assessment: Option<Assessment>,
@@ -120,7 +121,7 @@ pub struct Search {
 pub struct Assessment {
     /// Number of the set of data that the cost is for.
     set: u32,
-    outcomes: Arc<[Outcome]>,
+    outcomes: Outcomes,
     statistics: PointStatistics,
     /// `None` for a propagation.
     cost: Option<f64>,
@@ -156,7 +157,7 @@ impl Search {
     pub fn replay(
         &mut self,
         point: Point,
-        outcomes: Arc<[Outcome]>,
+        outcomes: Outcomes,
         estimated_error: Option<EstimatedError>,
     ) -> Result<(), ReplayError> {
         self.expects(point)?;
@@ -201,7 +202,7 @@ impl Search {
 
     /// Takes the outcomes, in index order, of the pending point, and the estimated errors of the
     /// successes, which do not influence the search. Ignored once done.
-    pub fn tell(&mut self, outcomes: Arc<[Outcome]>, estimated_error: Option<EstimatedError>) {
+    pub fn tell(&mut self, outcomes: Outcomes, estimated_error: Option<EstimatedError>) {
         let Step::Evaluate(point) = self.ask() else {
             return;
         };
@@ -222,22 +223,21 @@ impl Search {
         }
         // Points that only measure a derivative are not part of the path.
         if row.role.varied.is_none() {
-            self.digest.add_evaluation(&point, &assessed);
+            self.digest.add(&point, &assessed);
         }
         self.history.push(row);
     }
 
     /// Computes moments and cost of the pending point from its outcomes.
-    fn assess(&self, point: &Point, outcomes: &Arc<[Outcome]>) -> Assessment {
-        let statistics =
-            PointStatistics::from_outcomes(&self.specification.monte_carlo, point, outcomes);
+    fn assess(&self, point: &Point, outcomes: &Outcomes) -> Assessment {
+        let statistics = PointStatistics::new(&self.specification.monte_carlo, point, outcomes);
         let cost = match &self.plan {
             SearchPlan::Identification(identification) => {
                 Some(identification.cost(&self.specification, &statistics, point, outcomes))
             }
             SearchPlan::Propagation { .. } => None,
         };
-        Assessment { set: self.set(), outcomes: Arc::clone(outcomes), statistics, cost }
+        Assessment { set: self.set(), outcomes: outcomes.clone(), statistics, cost }
     }
 
     /// Returns the assessment of the pending point from one for any set of data.
@@ -268,6 +268,7 @@ impl Search {
             role: EvaluationRole::default(),
             point,
             moments: assessment.statistics.moments,
+            decay: assessment.statistics.decay,
             cost: assessment.cost,
             failures: FailureCounts::from_outcomes(&assessment.outcomes),
             estimated_error: None,
@@ -325,12 +326,17 @@ impl Search {
         let summary = self.summary();
         let outcomes = match &self.plan {
             SearchPlan::Identification(identification) => identification.best_outcomes(),
-            SearchPlan::Propagation { .. } => self.outcomes.as_deref(),
+            SearchPlan::Propagation { .. } => self.outcomes.as_ref(),
         };
         let best = summary.best.zip(outcomes).and_then(|(number, outcomes)| {
             summary.best_point(&self.specification, number, outcomes)
         });
         summary.result(&self.specification, ending, program, best, Vec::new())
+    }
+
+    /// Returns whether the decay of each realization is needed.
+    pub fn has_decays(&self) -> bool {
+        self.specification.has_decays()
     }
 
     /// Returns whether the data are groups.
@@ -350,8 +356,8 @@ impl Search {
 
 impl Assessment {
     /// Returns whether it is that of these very outcomes.
-    fn is_of(&self, outcomes: &Arc<[Outcome]>) -> bool {
-        Arc::ptr_eq(&self.outcomes, outcomes)
+    fn is_of(&self, outcomes: &Outcomes) -> bool {
+        self.outcomes.are_copies_of(outcomes)
     }
 }
 
@@ -371,7 +377,7 @@ impl Summary {
         &self,
         specification: &JobSpecification,
         number: u64,
-        outcomes: &[Outcome],
+        outcomes: &Outcomes,
     ) -> Option<BestPoint> {
         let row = self.history.iter().find(|row| row.number == number)?;
         let JobSpecification { monte_carlo, objective, .. } = specification;
@@ -385,10 +391,11 @@ impl Summary {
         });
         let by_likelihood = measured.filter(|_| *objective == Objective::Likelihood);
         let velocity = statistics::estimate(monte_carlo, &row.point, outcomes);
+        let decay = statistics::decay_estimate(monte_carlo, outcomes);
         let set = row.role.group as usize;
-        let agreement = velocity
-            .as_ref()
-            .and_then(|velocity| agreement(specification, set, &row.point, velocity));
+        let agreement = velocity.as_ref().and_then(|velocity| {
+            agreement(specification, set, &row.point, velocity, decay.as_ref())
+        });
         // Moments that the search could not match are not fitted.
         let fitted = match (objective, agreement) {
             (Objective::Likelihood, _) | (_, Some(Agreement { matched: true, .. })) => {
@@ -405,6 +412,7 @@ impl Summary {
             cost_error: by_likelihood
                 .and_then(|measured| likelihood_error(monte_carlo, &row.point, outcomes, measured)),
             velocity,
+            decay,
             failure_bias: statistics::failure_bias(monte_carlo, &row.point, outcomes),
             kolmogorov: tested.and_then(|set| {
                 kolmogorov_test(set.velocities, outcomes, monte_carlo.sampling, fitted)

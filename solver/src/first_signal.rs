@@ -3,7 +3,7 @@
 use std::f64::consts::LN_10;
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::outcome::FailureKind;
+use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::Ensemble;
 use osteon_common::settings::{Extremum, Picking};
 
@@ -40,6 +40,28 @@ pub struct ObservedRealization {
 }
 
 impl Solver {
+    /// Same as [`Solver::realization`], with the decay, which takes no further pass. A realization whose
+    /// decay is not finite is the failure `not_finite`.
+    pub fn realization_with_decay(
+        &self,
+        ensemble: &Ensemble,
+        index: u64,
+        workspace: &mut Workspace,
+    ) -> RealizationResult {
+        let arrival = match self.arrival_of(ensemble, index, workspace) {
+            Ok(arrival) => arrival,
+            Err(kind) => return RealizationResult::failed(kind),
+        };
+        // A random setup moves receivers along the probe never, and its tilt turns them with it.
+        let distances: Vec<f64> = self.setup().probe.distances().collect();
+        let Arrival { velocity, estimated_error, amplitudes, .. } = arrival;
+        let decay = decay(&distances, &amplitudes);
+        if !decay.is_finite() {
+            return RealizationResult::failed(FailureKind::NotFinite);
+        }
+        RealizationResult { outcome: Ok(velocity), estimated_error, decay }
+    }
+
     /// Computes all observables of realization `index` of an ensemble.
     ///
     /// # Errors

@@ -220,19 +220,27 @@ impl Solver {
         index: u64,
         workspace: &mut Workspace,
     ) -> RealizationResult {
-        let Ok(bone) = ensemble.bone(index) else {
-            return RealizationResult::failed(FailureKind::NotFinite);
-        };
+        match self.arrival_of(ensemble, index, workspace) {
+            Ok(Arrival { velocity, estimated_error, .. }) => {
+                RealizationResult { outcome: Ok(velocity), estimated_error, decay: 0.0 }
+            }
+            Err(kind) => RealizationResult::failed(kind),
+        }
+    }
+
+    /// Computes the arrival of the realization at `index` of `ensemble`.
+    pub(crate) fn arrival_of(
+        &self,
+        ensemble: &Ensemble,
+        index: u64,
+        workspace: &mut Workspace,
+    ) -> Result<Arrival, FailureKind> {
+        let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
         let arrival = match ensemble.own_setup(index, &self.setup) {
             Some(own) => self.beside(&own).arrival(&bone, workspace),
             None => self.arrival(&bone, workspace),
         };
-        match arrival {
-            Ok(Arrival { velocity, estimated_error, .. }) => {
-                RealizationResult { outcome: Ok(velocity), estimated_error }
-            }
-            Err(failure) => RealizationResult::failed(failure.kind),
-        }
+        arrival.map_err(|failure| failure.kind)
     }
 }
 

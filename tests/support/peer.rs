@@ -105,6 +105,7 @@ pub(crate) fn solve(work: &Work) -> Vec<RealizationResult> {
             Ok(arrival) => RealizationResult {
                 outcome: Ok(arrival.velocity),
                 estimated_error: arrival.estimated_error,
+                decay: 0.0,
             },
             Err(failure) => RealizationResult::failed(failure.kind),
         }

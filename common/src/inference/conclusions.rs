@@ -29,8 +29,8 @@ impl Conclusions {
     }
 }
 
-/// Returns the profiles, if the cost depends on the moments alone; they do not apply to other
-/// costs.
+/// Returns the profiles, if the cost depends on the moments of the velocities alone; they do not apply
+/// to other costs: no closed form tells of the decay.
 fn of_moments(specification: &JobSpecification, set: usize, best: &BestPoint) -> Vec<Profile> {
     match (best.velocity, &specification.data) {
         (Some(velocity), Some(data)) if is_of_moments(specification) => {
@@ -88,7 +88,9 @@ fn weights(specification: &JobSpecification, set: usize) -> Option<MomentWeights
 }
 
 fn is_of_moments(specification: &JobSpecification) -> bool {
-    specification.objective.is_of_moments() && !specification.has_priors()
+    specification.objective.is_of_moments()
+        && !specification.has_priors()
+        && !specification.has_decays()
 }
 
 /// Returns the cost that is low enough to stop; `None` for a likelihood.

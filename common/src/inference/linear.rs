@@ -1,5 +1,6 @@
-//! Singular value decomposition of a Jacobian with two rows, and its consequences.
+//! Singular value decomposition of a Jacobian with two rows, or three with decays, and its consequences.
 
+use super::decay::DecayWeights;
 use super::jacobian::Jacobian;
 use crate::conclusions::Direction;
 
@@ -7,16 +8,20 @@ use crate::conclusions::Direction;
 const RANK: f64 = 1e-6;
 /// A remainder of a unit vector shorter than this counts as rounding error.
 const REMAINDER: f64 = 1e-6;
+/// Rounds of rotations that diagonalize a matrix of three rows; each at least squares what is left.
+const SWEEPS: usize = 10;
 
-/// Directions of the box that two moments determine, and those that they leave free.
+/// Directions of the box that the moments determine, and those that they leave free.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Linear {
     /// Right singular vectors with their values, in decreasing order.
     pub(super) fixed: Vec<Direction>,
     /// The left singular vector of each.
-    left: Vec<[f64; 2]>,
+    left: Vec<[f64; 3]>,
     /// An orthonormal basis of the null space.
     pub(super) undetermined: Vec<Vec<f64>>,
+    /// With decays: the same of the Jacobian in standard errors, by which the least χ² moves.
+    weighted: Option<(Box<Self>, DecayWeights)>,
 }
 
 /// Effect of noise on a quantity.
@@ -24,43 +29,75 @@ pub(super) struct Linear {
 pub(super) struct NoiseResponse {
     /// Standard deviation.
     pub(super) deviation: f64,
-    /// Change of the quantity with each of the two logarithms.
-    pub(super) transfer: [f64; 2],
+    /// Change of the quantity with each of the moments.
+    pub(super) transfer: [f64; 3],
     /// Fraction of its gradient in the null space.
     pub(super) free_share: f64,
 }
 
 impl Linear {
-    pub(super) fn from_jacobian(jacobian: &Jacobian) -> Self {
+    /// Returns those of two moments, or of three, given their weights.
+    pub(super) fn from_jacobian(jacobian: &Jacobian, weights: Option<&DecayWeights>) -> Self {
         let columns = &jacobian.columns;
         let gram = |i: usize, j: usize| columns.iter().map(|column| column[i] * column[j]).sum();
-        let eigen = symmetric(gram(0, 0), gram(0, 1), gram(1, 1));
-        let largest = eigen[0].0.max(0.0).sqrt();
-        let mut linear = Self { fixed: Vec::new(), left: Vec::new(), undetermined: Vec::new() };
-        for (square, left) in eigen.into_iter().take(columns.len()) {
+        let Some(weights) = weights else {
+            let eigen = symmetric(gram(0, 0), gram(0, 1), gram(1, 1));
+            let eigen = eigen.map(|(square, [x, y])| (square, [x, y, 0.0]));
+            return Self::from_eigen(columns, &eigen);
+        };
+        let whitened: Vec<_> = columns.iter().map(|column| weights.whiten(*column)).collect();
+        let weighted = Self::from_eigen(&whitened, &eigen_of_rows(&whitened));
+        Self {
+            weighted: Some((Box::new(weighted), *weights)),
+            ..Self::from_eigen(columns, &eigen_of_rows(columns))
+        }
+    }
+
+    /// Returns them, given the eigenvalues of J Jᵀ in decreasing order with their vectors.
+    fn from_eigen(columns: &[[f64; 3]], eigen: &[(f64, [f64; 3])]) -> Self {
+        let largest = eigen.first().map_or(0.0, |(square, _)| square.max(0.0).sqrt());
+        let (mut fixed, mut lefts) = (Vec::new(), Vec::new());
+        for &(square, left) in eigen.iter().take(columns.len()) {
             let singular_value = square.max(0.0).sqrt();
             if !(singular_value > 0.0 && singular_value > RANK * largest) {
                 continue;
             }
-            let component = |c: &[f64; 2]| (left[0] * c[0] + left[1] * c[1]) / singular_value;
+            let component = |c: &[f64; 3]| dot(&left, c) / singular_value;
             let components = columns.iter().map(component).collect();
-            linear.fixed.push(Direction { singular_value, components });
-            linear.left.push(left);
+            fixed.push(Direction { singular_value, components });
+            lefts.push(left);
         }
-        linear.undetermined = complement(&linear.fixed, columns.len());
-        linear
+        let undetermined = complement(&fixed, columns.len());
+        Self { fixed, left: lefts, undetermined, weighted: None }
     }
 
-    /// Returns the response of a quantity with this gradient, if the logarithms of the moments have
-    /// this covariance; `None` if the data do not determine it at all.
+    /// Returns the response of a quantity with this gradient, if the moments have this covariance;
+    /// `None` if the data do not determine it at all.
     pub(super) fn response(
         &self,
         gradient: &[f64],
-        covariance: &[[f64; 2]; 2],
+        covariance: &[[f64; 3]; 3],
     ) -> Option<NoiseResponse> {
         let length = dot(gradient, gradient).sqrt();
-        let mut transfer = [0.0; 2];
-        let mut inside = 0.0;
+        let (own, inside) = self.transfer(gradient);
+        let transfer = match &self.weighted {
+            Some((weighted, weights)) => weights.transposed(weighted.transfer(gradient).0),
+            None => own,
+        };
+        let free_share = (1.0 - inside / (length * length)).max(0.0).sqrt();
+        let variance = transfer[0] * transfer[0] * covariance[0][0]
+            + 2.0 * transfer[0] * transfer[1] * covariance[0][1]
+            + transfer[1] * transfer[1] * covariance[1][1]
+            + 2.0 * transfer[2] * (transfer[0] * covariance[0][2] + transfer[1] * covariance[1][2])
+            + transfer[2] * transfer[2] * covariance[2][2];
+        let known = inside > 0.0 && variance.is_finite();
+        known.then(|| NoiseResponse { deviation: variance.max(0.0).sqrt(), transfer, free_share })
+    }
+
+    /// Returns the change of a quantity with this gradient by each of the moments, and the square of the
+    /// part of the gradient that lies in the directions that are fixed.
+    fn transfer(&self, gradient: &[f64]) -> ([f64; 3], f64) {
+        let (mut transfer, mut inside) = ([0.0; 3], 0.0);
         for (Direction { singular_value, components }, left) in self.fixed.iter().zip(&self.left) {
             let along = dot(gradient, components);
             inside += along * along;
@@ -68,12 +105,44 @@ impl Linear {
                 *sum += along / singular_value * left;
             }
         }
-        let free_share = (1.0 - inside / (length * length)).max(0.0).sqrt();
-        let variance = transfer[0] * transfer[0] * covariance[0][0]
-            + 2.0 * transfer[0] * transfer[1] * covariance[0][1]
-            + transfer[1] * transfer[1] * covariance[1][1];
-        let known = inside > 0.0 && variance.is_finite();
-        known.then(|| NoiseResponse { deviation: variance.max(0.0).sqrt(), transfer, free_share })
+        (transfer, inside)
+    }
+}
+
+/// Returns the eigenvalues of J Jᵀ, given the columns of J, in decreasing order, with their vectors, by
+/// Jacobi's rotations.
+fn eigen_of_rows(columns: &[[f64; 3]]) -> [(f64, [f64; 3]); 3] {
+    let gram = |i: usize, j: usize| columns.iter().map(|column| column[i] * column[j]).sum();
+    let mut matrix = [0, 1, 2].map(|i| [0, 1, 2].map(|j| gram(i, j)));
+    // Rows are the vectors.
+    let mut vectors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    for (p, q) in [(0, 1), (0, 2), (1, 2)].repeat(SWEEPS) {
+        rotate(&mut matrix, &mut vectors, p, q);
+    }
+    let mut eigen = [0, 1, 2].map(|k| (matrix[k][k], vectors[k]));
+    eigen.sort_by(|a, b| b.0.total_cmp(&a.0));
+    eigen
+}
+
+/// Makes the entry (p, q) of a symmetric matrix zero.
+fn rotate(matrix: &mut [[f64; 3]; 3], vectors: &mut [[f64; 3]; 3], p: usize, q: usize) {
+    let off: f64 = matrix[p][q];
+    if off == 0.0 {
+        return;
+    }
+    let half = (matrix[q][q] - matrix[p][p]) / (2.0 * off);
+    let tangent = half.signum() / (half.abs() + (half * half + 1.0).sqrt());
+    let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
+    let sine = tangent * cosine;
+    let turned = |x: f64, y: f64| (cosine * x - sine * y, sine * x + cosine * y);
+    for row in matrix.iter_mut() {
+        (row[p], row[q]) = turned(row[p], row[q]);
+    }
+    for column in 0..3 {
+        let (x, y) = turned(matrix[p][column], matrix[q][column]);
+        (matrix[p][column], matrix[q][column]) = (x, y);
+        let (x, y) = turned(vectors[p][column], vectors[q][column]);
+        (vectors[p][column], vectors[q][column]) = (x, y);
     }
 }
 
@@ -122,4 +191,31 @@ fn remainder(axis: usize, dimensions: usize, known: &[Vec<f64>]) -> (f64, Vec<f6
 
 fn dot(one: &[f64], other: &[f64]) -> f64 {
     one.iter().zip(other).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotations_find_the_eigenvectors() {
+        let columns = [[1.0, -2.0, 0.5], [0.3, 0.9, -4.0], [2.0, 0.1, 0.7], [-1.0, 0.4, 0.2]];
+        let eigen = eigen_of_rows(&columns);
+        assert!(eigen.is_sorted_by(|a, b| a.0 >= b.0));
+        for (k, (square, vector)) in eigen.iter().enumerate() {
+            for (other, (_, beside)) in eigen.iter().enumerate() {
+                let expected = if k == other { 1.0 } else { 0.0 };
+                assert!((dot(vector, beside) - expected).abs() < 1e-14, "{k} {other}");
+            }
+            for i in 0..3 {
+                let product: f64 = columns.iter().map(|c| c[i] * dot(c, vector)).sum();
+                assert!((product - square * vector[i]).abs() < 1e-12, "{k} {i}");
+            }
+        }
+        // Without a third row, as the closed form for two.
+        let columns = [[1.0, -2.0, 0.0], [0.3, 0.9, 0.0]];
+        let [first, second] = symmetric(1.09, -1.73, 4.81);
+        let found = eigen_of_rows(&columns);
+        assert!((found[0].0 - first.0).abs() < 1e-14 && (found[1].0 - second.0).abs() < 1e-14);
+    }
 }

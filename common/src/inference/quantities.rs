@@ -1,7 +1,8 @@
 //! Quantities with their intervals, which stay within what the law of the elasticity allows.
 
+use super::decay::DecayWeights;
 use super::linear::{Linear, NoiseResponse};
-use super::noise::{NORMAL, Noise};
+use super::noise::{DataNoise, NORMAL, Noise};
 use crate::bulk_velocity::bulk_velocity;
 use crate::conclusions::{DerivedQuantity, Uncertainty};
 use crate::data_statistics::{FewIntervals, intervals_of_data};
@@ -9,7 +10,7 @@ use crate::ensemble::DISPERSION_MAX;
 use crate::job::{Data, JobSpecification, Range};
 use crate::moments::ConfidenceInterval;
 use crate::parameters::{Parameter, Point};
-use crate::results::BestPoint;
+use crate::results::{BestPoint, DecayEstimate};
 
 /// How far the logarithm of a mean velocity may be off the closed form, ln √(c1111/ρ), between two
 /// values of e_L.
@@ -41,15 +42,54 @@ impl LogarithmicEnds {
     }
 }
 
+/// Noise of (ln v, ln Δ, relative decay); that of the decay is 0 if no decays were measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct AllNoise {
+    /// Covariance of the data's; `None` if it is not known.
+    data: Option<[[f64; 3]; 3]>,
+    /// Variances of the model's by sampling.
+    model: [f64; 3],
+}
+
+impl AllNoise {
+    /// Returns that of two moments, and of the decay with these weights and the model's estimate.
+    pub(super) fn new(
+        two: &Noise,
+        weights: Option<&DecayWeights>,
+        decay: Option<&DecayEstimate>,
+    ) -> Self {
+        let of_two = |data: &DataNoise| {
+            let [[mean, both], [_, variation]] = data.covariance;
+            [[mean, both, 0.0], [both, variation, 0.0], [0.0; 3]]
+        };
+        let sampling = weights.zip(decay);
+        let sampling =
+            sampling.map_or(0.0, |(weights, decay)| weights.relative(decay.standard_error));
+        Self {
+            data: weights.map(|weights| weights.covariance).or(two.data.as_ref().map(of_two)),
+            model: [two.model[0], two.model[1], sampling * sampling],
+        }
+    }
+
+    /// Returns the covariance of both together.
+    fn covariance(&self) -> [[f64; 3]; 3] {
+        let mut sum = self.data.unwrap_or_default();
+        for (axis, variance) in self.model.into_iter().enumerate() {
+            sum[axis][axis] += variance;
+        }
+        sum
+    }
+}
+
 /// The quantities at a best point.
 pub(super) struct Quantities<'a> {
     pub(super) specification: &'a JobSpecification,
     pub(super) best: &'a BestPoint,
     pub(super) linear: &'a Linear,
-    pub(super) noise: &'a Noise,
+    pub(super) noise: &'a AllNoise,
     pub(super) quantile: f64,
     /// Difference between data and model that the search has left.
-    pub(super) residual: [f64; 2],
+    pub(super) residual: [f64; 3],
     /// Ends of the intervals of the data's moments, if they are not symmetric.
     pub(super) ends: Option<LogarithmicEnds>,
     /// Whether intervals can be stated.
@@ -174,41 +214,49 @@ impl Quantities<'_> {
     /// Returns how far an interval reaches below and above the value: the effect of the noise, plus
     /// the distance by which the solution would move if the residual were removed.
     fn reaches(&self, response: &NoiseResponse) -> [f64; 2] {
-        let [mean, variation] = response.transfer;
-        let left = mean * self.residual[0] + variation * self.residual[1];
+        let [mean, variation, decay] = response.transfer;
+        let [of_mean, of_variation, of_decay] = self.residual;
+        let left = mean * of_mean + variation * of_variation + decay * of_decay;
         let of_noise = match (&self.ends, &self.noise.data) {
-            (Some(ends), Some(data)) => self.combined(response.transfer, ends, &data.covariance),
+            (Some(ends), Some(data)) => self.combined(response.transfer, ends, data),
             _ => [self.quantile * response.deviation; 2],
         };
         of_noise.map(|reach| reach + left.abs())
     }
 
-    /// Combines the intervals of both moments, which are not symmetric, by the squares of the
-    /// distances of their ends (MOVER: G. Y. Zou, "Toward using confidence intervals to compare
-    /// correlations", Psychol. Methods 12 (2007)), with the sampling's noise.
+    /// Combines the intervals of the moments, which are not symmetric, by the squares of the distances
+    /// of their ends (MOVER: G. Y. Zou, "Toward using confidence intervals to compare correlations",
+    /// Psychol. Methods 12 (2007)), with the sampling's noise.
     fn combined(
         &self,
-        [mean, variation]: [f64; 2],
+        transfer: [f64; 3],
         ends: &LogarithmicEnds,
-        covariance: &[[f64; 2]; 2],
+        covariance: &[[f64; 3]; 3],
     ) -> [f64; 2] {
-        let [[of_mean, both], [_, of_variation]] = *covariance;
-        let correlation = both / (of_mean * of_variation).sqrt();
-        let correlation = if correlation.is_finite() { correlation } else { 0.0 };
-        let sampling =
-            mean * mean * self.noise.model[0] + variation * variation * self.noise.model[1];
+        let correlation = |i: usize, j: usize| {
+            let both = covariance[i][j] / (covariance[i][i] * covariance[j][j]).sqrt();
+            if both.is_finite() { both } else { 0.0 }
+        };
+        let of_decay = self.quantile * covariance[2][2].sqrt();
+        let ends = [ends.mean, ends.variation, [of_decay; 2]];
+        let model = self.noise.model;
+        let sampling = transfer[0] * transfer[0] * model[0]
+            + transfer[1] * transfer[1] * model[1]
+            + transfer[2] * transfer[2] * model[2];
         [0, 1].map(|side| {
             // An end of the quantity comes from the same end of a moment that raises it.
-            let part = |transfer: f64, ends: [f64; 2]| match transfer {
-                _ if transfer == 0.0 => 0.0,
-                _ if transfer > 0.0 => transfer * ends[side],
-                _ => transfer * ends[1 - side],
+            let part = |axis: usize| match transfer[axis] {
+                0.0 => 0.0,
+                transfer if transfer > 0.0 => transfer * ends[axis][side],
+                transfer => transfer * ends[axis][1 - side],
             };
-            let (one, other) = (part(mean, ends.mean), part(variation, ends.variation));
-            if !(one.is_finite() && other.is_finite()) {
+            let [one, other, decay] = [0, 1, 2].map(part);
+            if !(one.is_finite() && other.is_finite() && decay.is_finite()) {
                 return f64::INFINITY;
             }
-            let data = one * one + other * other + 2.0 * correlation * one * other;
+            let of_velocities = one * one + other * other + 2.0 * correlation(0, 1) * one * other;
+            let across = correlation(0, 2) * one + correlation(1, 2) * other;
+            let data = of_velocities + decay * decay + 2.0 * decay * across;
             (data.max(0.0) + NORMAL * NORMAL * sampling).sqrt()
         })
     }

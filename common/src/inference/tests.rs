@@ -56,6 +56,7 @@ fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecifi
 
 fn row(point: Point, varied: Option<Parameter>) -> Evaluation {
     Evaluation {
+        decay: None,
         number: 0,
         role: EvaluationRole { varied, ..EvaluationRole::default() },
         point,
@@ -69,6 +70,7 @@ fn row(point: Point, varied: Option<Parameter>) -> Evaluation {
 /// Returns the optimum as the best point.
 fn best(cost: f64, standard_error: Moments) -> BestPoint {
     BestPoint {
+        decay: None,
         point: OPTIMUM,
         meaning: None,
         penalty: None,

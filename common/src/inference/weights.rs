@@ -1,9 +1,8 @@
 //! Weights of the two moments by the noise of the data: the cost χ² = rᵀ C⁻¹ r.
 
-use super::jacobian::log_ratios;
 use super::noise::{PARTS_MIN, data_noise, normal_law_noise};
 use crate::job::Data;
-use crate::moments::Moments;
+use crate::moments::{Moments, log_ratios};
 
 /// Largest correlation of the errors of both logarithms that counts, for the same reason.
 const CORRELATION_MAX: f64 = 0.95;

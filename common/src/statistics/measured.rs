@@ -42,25 +42,42 @@ pub fn without_repeatability(measured: Moments, repeatability: f64) -> Moments {
 /// independent however strongly the velocities of one subject are correlated (K.-Y. Liang and S. L.
 /// Zeger, Biometrika 73 (1986)): S/(S - 1) Σ g_s g_sᵀ / N².
 pub fn covariance_of_logarithms(set: &VelocitySet<'_>) -> Option<[[f64; 2]; 2]> {
+    covariance_of_means(set, influences_on_logarithms(set)?)
+}
+
+/// Returns the influence of each velocity on the logarithms of mean and coefficient of variation; `None`
+/// if there is no scatter but the instrument's.
+pub(super) fn influences_on_logarithms(
+    set: &VelocitySet<'_>,
+) -> Option<impl Iterator<Item = [f64; 2]>> {
     let central = central(set.velocities.iter().copied()).filter(Central::scatters)?;
     let known = set.repeatability * set.repeatability;
     if central.variance() <= known {
         return None;
     }
     let moments = without_repeatability(central.moments(), set.repeatability);
-    let influences = set.velocities.iter().map(|&velocity| {
+    Some(set.velocities.iter().map(move |&velocity| {
         let [mean, variation] = central.influence_without(known, velocity);
         [mean / moments.mean, variation / moments.coefficient_of_variation]
-    });
+    }))
+}
+
+/// Returns the covariance of the means of influences, one vector for each velocity of a set; `None` if
+/// it has only one independent part.
+pub(super) fn covariance_of_means<const N: usize>(
+    set: &VelocitySet<'_>,
+    influences: impl Iterator<Item = [f64; N]>,
+) -> Option<[[f64; N]; N]> {
+    let velocities = set.velocities.len() as f64;
     let Some(subjects) = set.subjects else {
-        let pairs = central.count * (central.count - 1.0);
+        let pairs = velocities * (velocities - 1.0);
         return Some(products(influences).map(|row| row.map(|sum| sum / pairs)));
     };
     let parts = set.parts();
     if parts < 2 {
         return None;
     }
-    let mut sums = vec![[Sum::default(); 2]; parts];
+    let mut sums = vec![[Sum::default(); N]; parts];
     for (influence, &subject) in influences.zip(subjects) {
         for (sum, part) in sums[subject as usize].iter_mut().zip(influence) {
             sum.add(part);
@@ -68,19 +85,19 @@ pub fn covariance_of_logarithms(set: &VelocitySet<'_>) -> Option<[[f64; 2]; 2]> 
     }
     let all = products(sums.iter().map(|sums| sums.map(|sum| sum.total())));
     let count = parts as f64;
-    let factor = count / (count - 1.0) / (central.count * central.count);
+    let factor = count / (count - 1.0) / (velocities * velocities);
     Some(all.map(|row| row.map(|sum| sum * factor)))
 }
 
 /// Returns the sum of the outer products of vectors with themselves.
-fn products(vectors: impl Iterator<Item = [f64; 2]>) -> [[f64; 2]; 2] {
-    let mut sums = [Sum::default(); 3];
-    for [mean, variation] in vectors {
-        let all = [mean * mean, mean * variation, variation * variation];
-        sums.iter_mut().zip(all).for_each(|(sum, product)| sum.add(product));
+fn products<const N: usize>(vectors: impl Iterator<Item = [f64; N]>) -> [[f64; N]; N] {
+    let mut sums = [[Sum::default(); N]; N];
+    for vector in vectors {
+        for (row, one) in sums.iter_mut().zip(vector) {
+            row.iter_mut().zip(vector).for_each(|(sum, other)| sum.add(one * other));
+        }
     }
-    let [mean, both, variation] = sums.map(|sum| sum.total());
-    [[mean, both], [both, variation]]
+    sums.map(|row| row.map(Sum::total))
 }
 
 #[cfg(test)]

@@ -6,10 +6,9 @@
 //! are the same as without branches.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::outcome::Outcome;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::results::EstimatedError;
 use osteon_search::{Assessment, Branch, same_point};
@@ -45,7 +44,7 @@ pub(crate) struct FollowedBranch {
 pub(crate) struct PreparedEvaluation {
     /// The part of the search that will ask for it; `None` if several will.
     pub(crate) part: Option<u64>,
-    pub(crate) outcomes: Arc<[Outcome]>,
+    pub(crate) outcomes: Outcomes,
     pub(crate) estimated_error: Option<EstimatedError>,
     /// All workers whose answers are in it.
     pub(crate) workers: BTreeSet<WorkerName>,
@@ -113,7 +112,7 @@ impl Ahead {
         let Some(complete) = evaluation.take_if(|evaluation| evaluation.is_settled()) else {
             return false;
         };
-        let Some((outcomes, estimated_error)) = complete.complete() else {
+        let Some((outcomes, estimated_error)) = complete.complete(branch.has_decays()) else {
             return false;
         };
         let assessment = branch.tell(&outcomes, None);

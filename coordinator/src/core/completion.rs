@@ -39,9 +39,13 @@ impl Completion {
     pub fn run(self) -> Completed {
         let Self { job, evaluation, search: mut after } = self;
         let attempt = evaluation.attempt;
+        let with_decays = after.has_decays();
         let (outcomes, estimated_error) = thread::scope(|scope| {
             let errors = scope.spawn(|| evaluation.estimated_error());
-            (evaluation.outcomes(), errors.join().unwrap_or_else(|panic| resume_unwind(panic)))
+            (
+                evaluation.outcomes(with_decays),
+                errors.join().unwrap_or_else(|panic| resume_unwind(panic)),
+            )
         });
         let record = outcomes.map(|outcomes| {
             let is_last = evaluation.diverges_from_store(&outcomes);

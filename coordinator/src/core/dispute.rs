@@ -102,11 +102,11 @@ impl Dispute {
     }
 }
 
-/// Returns whether two answers agree bit for bit, estimated errors included.
+/// Returns whether two answers agree bit for bit, estimated errors and decays included.
 pub(crate) fn same(a: RealizationResult, b: RealizationResult) -> bool {
     let bits = |solved: RealizationResult| {
         let (code, velocity) = encode(solved.outcome);
-        (code, velocity.to_bits(), solved.estimated_error.to_bits())
+        (code, velocity.to_bits(), solved.estimated_error.to_bits(), solved.decay.to_bits())
     };
     bits(a) == bits(b)
 }
@@ -120,8 +120,11 @@ mod tests {
     use super::*;
 
     fn vote(process: u32, velocity: f64) -> Vote {
-        let right = RealizationResult { outcome: Ok(1.0), estimated_error: 0.0 };
-        let solved = vec![right, RealizationResult { outcome: Ok(velocity), estimated_error: 0.0 }];
+        let right = RealizationResult { outcome: Ok(1.0), estimated_error: 0.0, decay: 0.0 };
+        let solved = vec![
+            right,
+            RealizationResult { outcome: Ok(velocity), estimated_error: 0.0, decay: 0.0 },
+        ];
         Vote { by: WorkerName::new("node", process, 0), solved }
     }
 

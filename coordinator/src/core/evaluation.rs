@@ -1,10 +1,10 @@
 //! An evaluation under way: a result for each index, and the indices that nobody computes yet.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::outcome::{FailureKind, Outcome, RealizationResult, encode};
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
@@ -34,7 +34,7 @@ pub(crate) enum StoredRecord {
     /// A record that cannot be read.
     Damaged,
     /// Outcomes, some of them from a worker that was banned.
-    Outcomes(Arc<[Outcome]>),
+    Outcomes(Outcomes),
 }
 
 /// The realizations of one point.
@@ -285,7 +285,7 @@ impl PendingEvaluation {
 
     /// Returns whether the evaluations stored after this one cannot be on its path, because the
     /// store has outcomes other than `outcomes` for it, or none.
-    pub(crate) fn diverges_from_store(&self, outcomes: &[Outcome]) -> bool {
+    pub(crate) fn diverges_from_store(&self, outcomes: &Outcomes) -> bool {
         let bits = |outcome: &Outcome| {
             let (code, velocity) = encode(*outcome);
             (code, velocity.to_bits())
@@ -294,25 +294,30 @@ impl PendingEvaluation {
             StoredRecord::Missing => true,
             StoredRecord::Damaged => false,
             StoredRecord::Outcomes(before) => {
+                let decays = |of: &Outcomes| -> Option<Vec<u64>> {
+                    of.decays().map(|all| all.iter().map(|decay| decay.to_bits()).collect())
+                };
                 !before.iter().map(bits).eq(outcomes.iter().map(bits))
+                    || decays(before) != decays(outcomes)
             }
         }
     }
 
-    /// Returns all outcomes in index order and the estimated errors of the successes, once it is
-    /// settled.
-    pub fn complete(&self) -> Option<(Arc<[Outcome]>, Option<EstimatedError>)> {
-        Some((self.outcomes()?, self.estimated_error()))
+    /// Returns all outcomes in index order, `with_decays` or without, and the estimated errors of the
+    /// successes, once it is settled.
+    pub fn complete(&self, with_decays: bool) -> Option<(Outcomes, Option<EstimatedError>)> {
+        Some((self.outcomes(with_decays)?, self.estimated_error()))
     }
 
-    /// Returns all outcomes in index order, once it is settled.
-    pub(crate) fn outcomes(&self) -> Option<Arc<[Outcome]>> {
+    /// Returns all outcomes in index order, `with_decays` or without, once it is settled.
+    pub(crate) fn outcomes(&self, with_decays: bool) -> Option<Outcomes> {
         if !self.is_settled() || self.results.iter().any(Option::is_none) {
             return None;
         }
         // None is empty. With a known length they are written to their place at once.
-        let empty = Err(FailureKind::NotFinite);
-        Some(self.results.iter().map(|result| result.map_or(empty, |it| it.outcome)).collect())
+        let empty = RealizationResult::failed(FailureKind::NotFinite);
+        let results = self.results.iter().map(|result| result.unwrap_or(empty));
+        Some(Outcomes::of_results(results, with_decays))
     }
 
     /// Returns the estimated errors of the successes so far.

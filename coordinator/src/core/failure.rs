@@ -69,9 +69,13 @@ impl RunFailure {
 pub(crate) fn shown(solved: RealizationResult) -> String {
     match solved.outcome {
         Ok(velocity) => format!(
-            "{velocity} m/s (bits {:016x}, estimated error {:?})",
+            "{velocity} m/s (bits {:016x}, estimated error {:?}{})",
             encode(solved.outcome).1.to_bits(),
-            solved.estimated_error
+            solved.estimated_error,
+            match solved.decay {
+                0.0 => String::new(),
+                decay => format!(", decay {decay:?}"),
+            }
         ),
         Err(kind) => kind.name().to_owned(),
     }

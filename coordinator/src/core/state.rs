@@ -242,6 +242,7 @@ impl State {
             point: evaluation.point,
             germs: specification.monte_carlo.germs(),
             random: specification.random,
+            with_decays: specification.has_decays(),
         };
         Some(Work {
             evaluation: Arc::new(shared),

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use futures::{Stream, StreamExt as _, stream};
 use osteon_common::limits::{FETCH_SECONDS_MAX, READER_STALL_SECONDS_MAX};
-use osteon_common::outcome::Outcome;
+use osteon_common::outcomes::Outcomes;
 use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::{FetchResponse, HistoryBlock};
@@ -54,7 +54,7 @@ async fn outcomes(
     store: &mpsc::WeakSender<StoreCommand>,
     job: JobId,
     number: Option<u64>,
-) -> Result<Option<Arc<[Outcome]>>, Status> {
+) -> Result<Option<Outcomes>, Status> {
     let Some(number) = number else { return Ok(None) };
     read(store, |reply| ReadRequest::Outcomes(job, number, reply)).await.map(Some)
 }
@@ -345,7 +345,7 @@ mod tests {
                     ReadRequest::Job(_, reply) => reply.send(Ok(job.clone())).is_ok(),
                     ReadRequest::Summary(_, reply) => reply.send(Ok(search.summary())).is_ok(),
                     ReadRequest::Outcomes(_, _, reply) => {
-                        reply.send(Ok(Arc::clone(&best.outcomes))).is_ok()
+                        reply.send(Ok(best.outcomes.clone())).is_ok()
                     }
                 };
                 assert!(answered, "nobody waits any more");

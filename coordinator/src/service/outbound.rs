@@ -182,6 +182,7 @@ mod tests {
             point: Point::of_bone([1.0; 7]),
             germs,
             random: RandomQuantities::default(),
+            with_decays: false,
         };
         Work { evaluation: Arc::new(evaluation), first: 0, count: 1 }
     }

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::outcome::Outcome;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::results::{BestPoint, Evaluation, GroupResult, JobResult};
 use osteon_search::Summary;
 use thiserror::Error;
@@ -105,7 +105,7 @@ impl StoredOutput {
 
     /// Returns the result without its groups, given the outcomes of the best evaluation. Computes
     /// the inference from the data.
-    pub(crate) fn result(&self, outcomes: Option<Arc<[Outcome]>>) -> JobResult {
+    pub(crate) fn result(&self, outcomes: Option<Outcomes>) -> JobResult {
         let best = self.best_point(self.best(), outcomes);
         let EndRecord { ending, program, .. } = &self.end;
         self.summary.result(&self.specification, ending, program, best, Vec::new())
@@ -113,20 +113,12 @@ impl StoredOutput {
 
     /// Returns the result of a group, given the outcomes of its best evaluation. Computes the
     /// inference from its data.
-    pub(crate) fn group(
-        &self,
-        set: usize,
-        outcomes: Option<Arc<[Outcome]>>,
-    ) -> Option<GroupResult> {
+    pub(crate) fn group(&self, set: usize, outcomes: Option<Outcomes>) -> Option<GroupResult> {
         let best = self.best_point(self.best_of(set), outcomes);
         self.summary.group(&self.specification, set, best)
     }
 
-    fn best_point(
-        &self,
-        number: Option<u64>,
-        outcomes: Option<Arc<[Outcome]>>,
-    ) -> Option<BestPoint> {
+    fn best_point(&self, number: Option<u64>, outcomes: Option<Outcomes>) -> Option<BestPoint> {
         let (number, outcomes) = number.zip(outcomes)?;
         self.summary.best_point(&self.specification, number, &outcomes)
     }
@@ -140,7 +132,7 @@ pub(crate) enum ReadRequest {
     /// The summary of the path of its search.
     Summary(JobId, Reply<Summary>),
     /// The outcomes of the evaluation with this number.
-    Outcomes(JobId, u64, Reply<Arc<[Outcome]>>),
+    Outcomes(JobId, u64, Reply<Outcomes>),
 }
 
 /// Channel for a record that was read.
@@ -174,7 +166,7 @@ fn summary(store: &mut dyn Store, job: JobId) -> Result<Summary, OutputError> {
     found(store, job, summary, OutputError::NoSummary { job })
 }
 
-fn outcomes(store: &mut dyn Store, job: JobId, number: u64) -> Result<Arc<[Outcome]>, OutputError> {
+fn outcomes(store: &mut dyn Store, job: JobId, number: u64) -> Result<Outcomes, OutputError> {
     let evaluation = store.evaluation(job, number)?;
     let evaluation = found(store, job, evaluation, OutputError::NoBest { job, number })?;
     Ok(evaluation.outcomes)

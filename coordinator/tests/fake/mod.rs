@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
-use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
+use osteon_common::outcome::{FailureKind, RealizationResult};
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, JobResult};
@@ -144,6 +145,7 @@ fn realization(work: &Work, index: u64) -> RealizationResult {
     RealizationResult {
         outcome: Ok(velocity),
         estimated_error: 1e-5 * (noise % 1000) as f64 / velocity,
+        decay: 0.0,
     }
 }
 
@@ -163,7 +165,7 @@ pub(crate) fn plain_run(specification: &JobSpecification) -> JobResult {
         match search.ask() {
             Step::Evaluate(point) => {
                 let (outcomes, estimated_error) = evaluation(specification, point);
-                told.push(Arc::clone(&outcomes));
+                told.push(outcomes.clone());
                 search.tell(outcomes, estimated_error);
             }
             Step::Done(ending) => return left_by(&search, specification, &told, &ending),
@@ -175,7 +177,7 @@ pub(crate) fn plain_run(specification: &JobSpecification) -> JobResult {
 pub(crate) fn left_by(
     search: &Driven,
     specification: &JobSpecification,
-    told: &[Arc<[Outcome]>],
+    told: &[Outcomes],
     ending: &Ending,
 ) -> JobResult {
     let summary = search.summary();
@@ -194,12 +196,13 @@ pub(crate) fn left_by(
 pub(crate) fn evaluation(
     specification: &JobSpecification,
     point: Point,
-) -> (Arc<[Outcome]>, Option<EstimatedError>) {
+) -> (Outcomes, Option<EstimatedError>) {
     let evaluation = Arc::new(EvaluationInput {
         id: 1,
         setup: specification.setup,
         point,
         random: RandomQuantities::default(),
+        with_decays: false,
         germs: specification.monte_carlo.germs(),
     });
     let work = |first| Work { evaluation: Arc::clone(&evaluation), first, count: 1 };

@@ -111,7 +111,7 @@ fn broken_run(specification: &JobSpecification, evaluations: usize, ending: &End
     for _ in 0..evaluations {
         if let Step::Evaluate(point) = search.ask() {
             let (outcomes, estimated_error) = fake::evaluation(specification, point);
-            told.push(Arc::clone(&outcomes));
+            told.push(outcomes.clone());
             search.tell(outcomes, estimated_error);
         }
     }

@@ -18,7 +18,7 @@ use crate::velocities::{self, CsvError, Measured, NamedColumns};
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 
 /// The keys of `[data]`.
-pub(super) const KEYS: [Key; 10] = [
+pub(super) const KEYS: [Key; 12] = [
     Key {
         name: "velocities",
         meaning: "for `identify`: path of a CSV file, relative to the job file's directory, with a \
@@ -37,6 +37,10 @@ pub(super) const KEYS: [Key; 10] = [
                   least two subjects, in each group",
     },
     Key {
+        name: "decay",
+        meaning: "name of the CSV column that holds the decay along the array (dB/cm, -100 to 100, with a                   mean above 0) measured with each velocity, in every row: the mean decay is matched                   beside the moments of the velocities, see [below](#decays); requires the objective                   `\"chi_square\"`, the search `\"simplex\"`, no `[posterior]`, and at least ten                   velocities, or subjects, in each group",
+    },
+    Key {
         name: "known",
         meaning: "quantities of the setup that are known of each group: the names of the CSV columns that \
                   hold their values (SI units, the same in all rows of a group), for any of \
@@ -46,11 +50,15 @@ pub(super) const KEYS: [Key; 10] = [
     Key {
         name: "groups",
         meaning: "instead of a file: a table with a list of velocities for each group name, or with a \
-                  table of `velocities`, `subjects`, and quantities that are `known` of the group",
+                  table of `velocities`, `subjects`, `decays`, and quantities that are `known` of the group",
     },
     Key {
         name: "subjects",
         meaning: "with a list of velocities: the subject of each, a whole number",
+    },
+    Key {
+        name: "decays",
+        meaning: "with a list of velocities: the decay of each, dB/cm, as for `decay`",
     },
     Key {
         name: MOMENTS[0],
@@ -146,7 +154,7 @@ fn given(
 /// Records keys that say nothing about data of this form.
 fn unneeded(reader: &mut Reader, table: &Table<'_>, has_moments: bool) {
     let has_velocities = table.has("velocities");
-    for key in ["group", "subject", "known"].into_iter().filter(|key| table.has(key)) {
+    for key in ["group", "subject", "decay", "known"].into_iter().filter(|key| table.has(key)) {
         if !has_velocities {
             let message =
                 "names a column of the file of velocities, and there is none; give `velocities`";
@@ -156,6 +164,10 @@ fn unneeded(reader: &mut Reader, table: &Table<'_>, has_moments: bool) {
     if table.has("subjects") && !has_velocities {
         let message = "has a subject for each of `velocities`, and there are none";
         reader.lacks(&table.path("subjects"), &[table.path("velocities")], message);
+    }
+    if table.has("decays") && !has_velocities {
+        let message = "has a decay for each of `velocities`, and there are none";
+        reader.lacks(&table.path("decays"), &[table.path("velocities")], message);
     }
     if table.has("count") && !has_moments {
         let message = "is the number of velocities behind `mean` and `coefficient_of_variation`, and \
@@ -192,7 +204,7 @@ fn group(reader: &mut Reader, groups: &str, name: &str, node: &Node) -> Option<G
     match &node.value {
         Value::List(elements) => Some(Group::new(name, reader.numbers(&path, elements)?)),
         Value::Table(_) => {
-            let mut keys = vec!["velocities", "subjects"];
+            let mut keys = vec!["velocities", "subjects", "decays"];
             keys.extend(Parameter::OF_SETUP.map(Parameter::name));
             let table = reader.table_at(node, path, &keys);
             let expected = "a list of velocities (m/s)";
@@ -201,13 +213,16 @@ fn group(reader: &mut Reader, groups: &str, name: &str, node: &Node) -> Option<G
             }
             let elements = reader.list(&table, "velocities", expected);
             let subjects = subjects(reader, &table);
+            let decays = decays(reader, &table);
             let known = Parameter::OF_SETUP.map(|one| reader.number(&table, one.name()));
             let known = KnownQuantities::new(known);
             let velocities = reader.numbers(&table.path("velocities"), elements?)?;
-            Some(Group { name: name.to_owned(), velocities, subjects: subjects?, known })
+            let (name, subjects, decays) = (name.to_owned(), subjects?, decays?);
+            Some(Group { name, velocities, subjects, decays, known })
         }
         other => {
-            let expected = "a list of velocities (m/s), or a table with velocities and subjects";
+            let expected =
+                "a list of velocities (m/s), or a table with velocities, subjects and decays";
             reader.wrong_type(path, expected, other);
             None
         }
@@ -225,6 +240,15 @@ fn subjects(reader: &mut Reader, table: &Table<'_>) -> Option<Option<Vec<u32>>> 
     Some(Some(numbered(whole)))
 }
 
+/// Reads the list `decays`, if there is one; `None` if it is wrong.
+fn decays(reader: &mut Reader, table: &Table<'_>) -> Option<Option<Vec<f64>>> {
+    if !table.has("decays") {
+        return Some(None);
+    }
+    let elements = reader.list(table, "decays", "a list with a decay (dB/cm) for each velocity")?;
+    Some(Some(reader.numbers(&table.path("decays"), elements)?))
+}
+
 fn velocities(
     reader: &mut Reader,
     table: &Table<'_>,
@@ -232,7 +256,8 @@ fn velocities(
     from_file: impl FnOnce(&str, NamedColumns<'_>) -> Result<Measurements, Vec<CsvError>>,
 ) -> Option<Measurements> {
     let path = table.path("velocities");
-    let [group, subject] = ["group", "subject"].map(|key| column(reader, table, key));
+    let [group, subject, decay] =
+        ["group", "subject", "decay"].map(|key| column(reader, table, key));
     let known = known_columns(reader, table);
     match &table.get("velocities")?.value {
         Value::List(_) if table.has("group") => {
@@ -253,10 +278,22 @@ fn velocities(
             reader.violations.add(table.path("subject"), message);
             None
         }
+        Value::List(_) if table.has("decay") => {
+            let message = "names a column of a file, but velocities is a list; \
+                           give the name of a CSV file, or the list `decays`";
+            reader.violations.add(table.path("decay"), message);
+            None
+        }
         Value::List(elements) => {
-            let subjects = subjects(reader, table);
+            let (subjects, decays) = (subjects(reader, table), decays(reader, table));
             let velocities = reader.numbers(&path, elements)?;
-            Some(Measurements::Velocities { velocities, subjects: subjects? })
+            Some(Measurements::Velocities { velocities, subjects: subjects?, decays: decays? })
+        }
+        Value::Text(_) if table.has("decays") => {
+            let message = "has a decay for each of a list of velocities, but velocities is a file; \
+                           name its column: decay = \"…\"";
+            reader.violations.add(table.path("decays"), message);
+            None
         }
         Value::Text(_) if table.has("subjects") => {
             let message = "has a subject for each of a list of velocities, but velocities is a file; \
@@ -271,7 +308,7 @@ fn velocities(
             None
         }
         Value::Text(_) if kind == JobKind::Propagation => None,
-        Value::Text(name) => match from_file(name, NamedColumns { group, subject, known }) {
+        Value::Text(name) => match from_file(name, NamedColumns { group, subject, decay, known }) {
             Ok(data) => Some(data),
             Err(problems) => {
                 for problem in problems {
@@ -320,8 +357,8 @@ fn from_file(
     let Measured { data: mut groups, origin } = velocities::read(path, named)?;
     let measurements = match (named.group, groups.pop()) {
         // Without a column of groups all velocities are in one.
-        (None, Some(Group { velocities, subjects, .. })) => {
-            Measurements::Velocities { velocities, subjects }
+        (None, Some(Group { velocities, subjects, decays, .. })) => {
+            Measurements::Velocities { velocities, subjects, decays }
         }
         (_, last) => {
             groups.extend(last);

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::schema::keyed_by_parameter;
-use super::{MeanModel, Moments, finite_or_null};
+use super::{MeanModel, MomentSlopes, Moments, finite_or_null};
 
 /// The quantities that the data determine, to first order around the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -116,10 +116,11 @@ pub struct Direction {
 }
 
 /// The derivatives ∂ ln v/∂ ln p and ∂ ln Δ/∂ ln p for each free parameter p.
-pub(super) fn sensitivities(found: &Inference) -> BTreeMap<Parameter, Moments> {
+pub(super) fn sensitivities(found: &Inference) -> BTreeMap<Parameter, MomentSlopes> {
     let slopes = found.sensitivities.iter().map(|one| {
         let coefficient_of_variation = one.coefficient_of_variation;
-        (one.parameter, results::Moments { mean: one.mean, coefficient_of_variation }.into())
+        let moments = results::Moments { mean: one.mean, coefficient_of_variation }.into();
+        (one.parameter, MomentSlopes { moments, decay: one.decay })
     });
     slopes.collect()
 }

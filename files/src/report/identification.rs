@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use osteon_common::job::{Objective, Prior, Sampling, SearchMethod};
+use osteon_common::moments::DecayEstimate;
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{BestPoint, GroupResult, JobFailure, JobResult, PointMeaning, Status};
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::conclusions::{Identified, ParameterProfile, Solutions, profiles, sensitivities};
 use super::schema::{keyed_by_failure, keyed_by_parameter};
 use super::{
-    Data, EstimatedErrors, MeanModel, Moments, PosteriorReport, Solver, Velocity,
+    Data, EstimatedErrors, MeanModel, MomentSlopes, PosteriorReport, Solver, Velocity,
     absent_or_nullable, finite_or_null,
 };
 
@@ -48,6 +49,10 @@ pub struct Identification {
     pub dispersion: Option<f64>,
     /// Moments of the model's velocities at the best point.
     pub velocity: Velocity,
+    /// Decays of the model's realizations, with the standard error of their mean by sampling; not there
+    /// where none were measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decay: Option<DecayEstimate>,
     /// The data; not there where they are groups.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub data: Option<Data>,
@@ -76,7 +81,7 @@ pub struct Identification {
         deserialize_with = "absent_or_nullable"
     )]
     #[schemars(transform = keyed_by_parameter)]
-    pub sensitivities: Option<Option<BTreeMap<Parameter, Moments>>>,
+    pub sensitivities: Option<Option<BTreeMap<Parameter, MomentSlopes>>>,
     /// The quantities that the data determine; null where the derivatives were not measured, absent if
     /// the data are groups.
     #[serde(
@@ -128,7 +133,7 @@ impl Identification {
     }
 
     /// The derivatives, where they were measured.
-    pub fn sensitivities(&self) -> Option<&BTreeMap<Parameter, Moments>> {
+    pub fn sensitivities(&self) -> Option<&BTreeMap<Parameter, MomentSlopes>> {
         self.sensitivities.as_ref()?.as_ref()
     }
 }
@@ -154,6 +159,7 @@ impl From<&JobResult> for Identification {
             parameters: found.parameters,
             dispersion: found.dispersion,
             velocity: best.into(),
+            decay: best.and_then(|best| best.decay),
             data: single.map(|data| Data::of_job(data, best)),
             evaluations: result.evaluations,
             realizations: result.realizations,
@@ -226,6 +232,10 @@ pub struct Group {
     pub dispersion: Option<f64>,
     /// Moments of the model's velocities at the best point.
     pub velocity: Velocity,
+    /// Decays of the model's realizations, with the standard error of their mean by sampling; not there
+    /// where none were measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decay: Option<DecayEstimate>,
     /// The data of the group.
     pub data: Data,
     /// Number of failed realizations at the best point, by kind; kinds that did not occur are not there.
@@ -234,7 +244,7 @@ pub struct Group {
     /// Relative changes of the moments for a relative change of each free parameter; null where they
     /// were not measured.
     #[schemars(transform = keyed_by_parameter)]
-    pub sensitivities: Option<BTreeMap<Parameter, Moments>>,
+    pub sensitivities: Option<BTreeMap<Parameter, MomentSlopes>>,
     /// The quantities that the data determine; null where the derivatives were not measured.
     pub identified: Option<Identified>,
     /// For each free parameter the lowest cost with it held at values from bound to bound.
@@ -263,6 +273,7 @@ impl Group {
             parameters: found.parameters,
             dispersion: found.dispersion,
             velocity: best.into(),
+            decay: best.and_then(|best| best.decay),
             data: Data::of_group(&group.data, best),
             failures: found.failures,
             sensitivities: inference.map(sensitivities),

@@ -1,6 +1,6 @@
 //! The objects `velocity` and `data`: moments of the model and of the data, and what is known of them.
 
-use osteon_common::moments::{ConfidenceInterval, KolmogorovTest, Outlier};
+use osteon_common::moments::{ConfidenceInterval, DecayEstimate, KolmogorovTest, Outlier};
 use osteon_common::results::{self, BestPoint, DataSummary};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -82,6 +82,17 @@ impl From<Option<&BestPoint>> for Velocity {
     }
 }
 
+/// Derivatives of the moments along a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MomentSlopes {
+    /// Those of the logarithms of both moments of the velocities, by the parameter's logarithm.
+    #[serde(flatten)]
+    pub moments: Moments,
+    /// That of the mean decay, relative to that of the data; not there where no decays were measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decay: Option<f64>,
+}
+
 /// Moments of the data; where velocities were measured also their intervals, those far from
 /// the others, and a test of the model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -89,6 +100,10 @@ pub struct Data {
     /// The moments, that of the mean in m/s.
     #[serde(flatten)]
     pub moments: Moments,
+    /// The measured decays, with the standard error of their mean by their scatter; not there where none
+    /// were measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decay: Option<DecayEstimate>,
     /// Confidence intervals of the moments of the law that the velocities were drawn from; not there
     /// where only moments are known, and not `data.count`, null where the velocities give none.
     #[serde(
@@ -131,6 +146,7 @@ impl Data {
         let intervals = data.intervals.map(MomentIntervals::from);
         Self {
             moments: data.moments.into(),
+            decay: data.decay,
             interval: (measured || intervals.is_some()).then_some(intervals),
             kolmogorov: measured.then(|| best.and_then(|best| best.kolmogorov)),
             outliers: data.outliers.clone(),

@@ -1,6 +1,6 @@
 //! The columns of a CSV file of velocities, and its rows.
 
-use osteon_common::check::VELOCITY;
+use osteon_common::check::{DECAY, VELOCITY};
 use osteon_common::parameters::Parameter;
 
 use super::problem::{COLUMN, Problem, listed, shortened};
@@ -16,6 +16,8 @@ pub(crate) struct NamedColumns<'a> {
     pub(crate) group: Option<&'a str>,
     /// The column of the subject of each velocity.
     pub(crate) subject: Option<&'a str>,
+    /// The column of the decay that was measured with each velocity.
+    pub(crate) decay: Option<&'a str>,
     /// The columns of quantities that are known of each group, for each of [`Parameter::OF_SETUP`].
     pub(crate) known: [Option<&'a str>; Parameter::OF_SETUP.len()],
 }
@@ -26,6 +28,7 @@ pub(super) struct Columns {
     velocity: usize,
     group: Option<NamedColumn>,
     subject: Option<NamedColumn>,
+    decay: Option<NamedColumn>,
     known: [Option<NamedColumn>; Parameter::OF_SETUP.len()],
     /// A column that seems to name subjects, if none is named.
     like_subjects: Option<NamedColumn>,
@@ -47,6 +50,8 @@ pub(super) struct Row {
     pub(super) subject: Option<String>,
     /// Velocity, m/s.
     pub(super) velocity: f64,
+    /// Decay, dB/cm, if there is a column of decays.
+    pub(super) decay: Option<f64>,
     /// Quantities that are known of the group.
     pub(super) known: [Option<f64>; Parameter::OF_SETUP.len()],
 }
@@ -69,6 +74,7 @@ impl Columns {
         };
         let group = column(named.group, "group")?;
         let subject = column(named.subject, "subject")?;
+        let decay = column(named.decay, "decay")?;
         let is_like = |name: &&String| {
             LIKE_SUBJECTS.contains(&name.to_lowercase().as_str())
                 && named.group != Some(name.as_str())
@@ -81,7 +87,7 @@ impl Columns {
         for (found, name) in known.iter_mut().zip(named.known) {
             *found = column(name, "value")?;
         }
-        Ok(Self { count: names.len(), velocity, group, subject, known, like_subjects })
+        Ok(Self { count: names.len(), velocity, group, subject, decay, known, like_subjects })
     }
 
     /// Returns the fields of a line that are used.
@@ -100,11 +106,12 @@ impl Columns {
             (None, Some(column)) => Some(std::mem::take(&mut fields[column.place])),
             (None, None) => None,
         };
+        let decay = self.decay.as_ref().map(|column| column.decay_in(&fields)).transpose()?;
         let mut known = [None; Parameter::OF_SETUP.len()];
         for (value, column) in known.iter_mut().zip(&self.known) {
             *value = column.as_ref().map(|column| column.number_in(&fields)).transpose()?;
         }
-        Ok(Row { group, subject, velocity, known })
+        Ok(Row { group, subject, velocity, decay, known })
     }
 
     /// Returns the name of the column of a known quantity, by its position.
@@ -129,6 +136,14 @@ impl NamedColumn {
 }
 
 impl NamedColumn {
+    fn decay_in(&self, fields: &[String]) -> Result<f64, Problem> {
+        let text = fields[self.place].as_str();
+        match text.parse::<f64>() {
+            Ok(decay) if DECAY.contains(decay) => Ok(decay),
+            _ => Err(Problem::NoDecay { column: shortened(&self.name), found: shortened(text) }),
+        }
+    }
+
     fn number_in(&self, fields: &[String]) -> Result<f64, Problem> {
         let text = fields[self.place].as_str();
         let column = || shortened(&self.name);

@@ -38,6 +38,11 @@ pub(super) enum Problem {
     #[error("{column} is empty; it must be a number (SI units), the same in all rows of a group")]
     NoKnownValue { column: String },
     #[error(
+        "{column} is {found:?}; it must be the decay of the velocity in dB/cm, a number from -100 to 100 (a \
+         row without a decay cannot be used with [data] decay: leave it out of the file)"
+    )]
+    NoDecay { column: String, found: String },
+    #[error(
         "{column} is {found:?}; it must be a number (SI units), the same in all rows of a group"
     )]
     NotAKnownValue { column: String, found: String },

@@ -45,6 +45,7 @@ fn result() -> JobResult {
         reason: None,
         digest: "0123abcd".to_owned(),
         best: Some(BestPoint {
+            decay: None,
             point: POINT,
             meaning: None,
             cost: Some(4.5e-11),
@@ -63,6 +64,7 @@ fn result() -> JobResult {
             outcomes: outcomes(),
         }),
         data: Some(DataSummary {
+            decay: None,
             moments: moments(3906.3, 0.02709),
             count: None,
             intervals: None,
@@ -358,6 +360,7 @@ fn history() {
         role: EvaluationRole::default(),
         point: POINT,
         moments,
+        decay: None,
         cost,
         failures,
         estimated_error: None,
@@ -398,6 +401,7 @@ fn the_history_names_start_and_group() {
         role: EvaluationRole { group: 1, start: 1, ..EvaluationRole::default() },
         point: POINT,
         moments: None,
+        decay: None,
         cost: Some(0.5),
         failures: FailureCounts::default(),
         estimated_error: None,

@@ -213,6 +213,7 @@ fn the_history_is_that_of_the_search() {
         role,
         point: POINT,
         moments: Some(moments(3906.5, 0.0271)),
+        decay: None,
         cost: Some(1e-3),
         failures: FailureCounts::default(),
         estimated_error: None,

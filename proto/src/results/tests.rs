@@ -12,7 +12,7 @@ use osteon_common::inference::{
 use osteon_common::job::{Prior, Sampling, SearchMethod};
 use osteon_common::moments::{ConfidenceInterval, MomentIntervals, Outlier};
 use osteon_common::parameters::{AS_IN_SETUP, BONE_PARAMETERS, Parameter, Point};
-use osteon_common::results::{DataSummary, JobFailure, PointMeaning, Status};
+use osteon_common::results::{DataSummary, DecayEstimate, JobFailure, PointMeaning, Status};
 
 /// Any number, including both zeros, infinities and subnormal numbers.
 pub(crate) fn number() -> impl Strategy<Value = f64> {
@@ -69,6 +69,7 @@ prop_compose! {
         cost_error in proptest::option::of(0.0..1.0),
         failure_bias in proptest::option::of(moments()),
         kolmogorov in proptest::option::of((0.0..1.0, 0.0..1.0)),
+        decay in decay(),
     ) -> BestPoint {
         let kolmogorov =
             kolmogorov.map(|(distance, p_value)| KolmogorovTest { distance, p_value });
@@ -86,6 +87,7 @@ prop_compose! {
             penalty,
             below_noise_from,
             velocity,
+            decay,
             failure_bias,
             kolmogorov,
             failures,
@@ -93,6 +95,13 @@ prop_compose! {
             outcomes,
         }
     }
+}
+
+fn decay() -> impl Strategy<Value = Option<DecayEstimate>> {
+    let numbers = (number(), number(), number());
+    proptest::option::of(numbers.prop_map(|(mean, standard_deviation, standard_error)| {
+        DecayEstimate { mean, standard_deviation, standard_error }
+    }))
 }
 
 fn interval() -> impl Strategy<Value = ConfidenceInterval> {
@@ -115,11 +124,12 @@ prop_compose! {
         outliers in proptest::collection::vec(outlier(), 0..3),
         outlier_count: u64,
         rounding in proptest::option::of(number()),
+        decay in decay(),
     ) -> DataSummary {
         let intervals = intervals.map(|(mean, coefficient_of_variation, level)| {
             MomentIntervals { mean, coefficient_of_variation, level }
         });
-        DataSummary { moments, count, intervals, outliers, outlier_count, rounding }
+        DataSummary { moments, decay, count, intervals, outliers, outlier_count, rounding }
     }
 }
 
@@ -145,7 +155,8 @@ prop_compose! {
         matched in any::<bool>(),
         level in 0.0..1.0,
         noise in (proptest::option::of(moments()), moments()),
-        slopes in proptest::collection::vec((number(), number()), free.len()),
+        slopes in proptest::collection::vec(
+            (number(), number(), proptest::option::of(number())), free.len()),
         fixed in proptest::collection::vec(
             (0.0..10.0, proptest::collection::vec(number(), free.len())), 0..3),
         undetermined in proptest::collection::vec(
@@ -162,8 +173,8 @@ prop_compose! {
             level,
             noise: NoiseErrors { data: noise.0, sampling: noise.1 },
             sensitivities: slopes
-                .map(|(&parameter, (mean, coefficient_of_variation))| {
-                    Sensitivity { parameter, mean, coefficient_of_variation }
+                .map(|(&parameter, (mean, coefficient_of_variation, decay))| {
+                    Sensitivity { parameter, mean, coefficient_of_variation, decay }
                 })
                 .collect(),
             fixed: fixed.into_iter().map(direction).collect(),
@@ -314,11 +325,12 @@ properties! {
         cost in cost(),
         failures in failures(),
         estimated_error in estimated_error(),
+        decay in proptest::option::of(number()),
     ) {
         let varied = varied.map(|k| Parameter::ALL[k]);
         let role = EvaluationRole { group, start, varied, posterior };
         let evaluation =
-            Evaluation { number, role, point, moments, cost, failures, estimated_error };
+            Evaluation { number, role, point, moments, decay, cost, failures, estimated_error };
         let message = evaluation_to_message(&evaluation);
         prop_assert_eq!(evaluation_from_message(&message), Ok(evaluation));
     }
@@ -363,6 +375,7 @@ fn complete() -> v1::JobResult {
                 parameter: Parameter::Density,
                 mean: -0.5,
                 coefficient_of_variation: 0.0,
+                decay: None,
             }],
             fixed: vec![Direction { singular_value: 0.2, components: vec![1.0] }],
             undetermined: Vec::new(),

@@ -9,8 +9,8 @@ use tonic::Code;
 use crate::{Findings, full_name};
 
 /// Words of which the comment of a number has one. Names of units, or what stands for one.
-const UNITS: [&str; 11] =
-    ["m", "s", "rad", "Hz", "N", "Pa", "m/s", "kg/m³", "1/s", "dimensionless", "unit"];
+const UNITS: [&str; 12] =
+    ["m", "s", "rad", "Hz", "N", "Pa", "m/s", "kg/m³", "1/s", "dB/cm", "dimensionless", "unit"];
 
 // Numbers of fields in descriptors, of which the paths of comments are made.
 const FILE_MESSAGE: i32 = 4;

@@ -9,6 +9,8 @@ use osteon_common::job::{
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, Status};
 
+mod decays;
+
 use super::*;
 
 /// Only e_L and the dispersion are free.
@@ -38,7 +40,8 @@ fn speeds(realizations: &Realizations) -> Vec<RealizationResult> {
         let bone = realizations.ensemble.bone(index).unwrap();
         (bone.elasticity.rows()[0][0] / bone.density).sqrt()
     };
-    let solved = |index| RealizationResult { outcome: Ok(speed(index)), estimated_error: 1e-5 };
+    let solved =
+        |index| RealizationResult { outcome: Ok(speed(index)), estimated_error: 1e-5, decay: 0.0 };
     (0..realizations.count).map(solved).collect()
 }
 
@@ -58,7 +61,8 @@ fn the_result_is_that_of_the_search() {
                     let MonteCarlo { realizations: count, .. } = specification.monte_carlo;
                     let germs = specification.monte_carlo.germs();
                     let ensemble = Ensemble::drawn(&point, germs).unwrap();
-                    let solved = speeds(&Realizations { point, ensemble, count });
+                    let solved =
+                        speeds(&Realizations { point, ensemble, count, with_decays: false });
                     search.tell(solved.iter().map(|one| one.outcome).collect(), errors);
                 }
                 Step::Done(ending) => break ending,
@@ -124,10 +128,14 @@ fn what_no_worker_answers_is_refused() {
     let few = refused(|solved| Ok(solved[1..].to_vec()));
     assert_eq!(few, "evaluation 2 has 49 outcomes; it must have 50, one of each realization");
     for wrong in [
-        RealizationResult { outcome: Ok(f64::NAN), estimated_error: 0.0 },
-        RealizationResult { outcome: Ok(-1.0), estimated_error: 0.0 },
-        RealizationResult { outcome: Ok(3900.0), estimated_error: -1e-5 },
-        RealizationResult { outcome: Err(FailureKind::NoArrival), estimated_error: 1e-5 },
+        RealizationResult { outcome: Ok(f64::NAN), estimated_error: 0.0, decay: 0.0 },
+        RealizationResult { outcome: Ok(-1.0), estimated_error: 0.0, decay: 0.0 },
+        RealizationResult { outcome: Ok(3900.0), estimated_error: -1e-5, decay: 0.0 },
+        RealizationResult {
+            outcome: Err(FailureKind::NoArrival),
+            estimated_error: 1e-5,
+            decay: 0.0,
+        },
     ] {
         let text = refused(|mut solved| {
             solved[7] = wrong;

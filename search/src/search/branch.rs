@@ -8,7 +8,8 @@
 use std::sync::Arc;
 
 use osteon_common::job::{Data, JobSpecification};
-use osteon_common::outcome::{FailureCounts, Outcome};
+use osteon_common::outcome::FailureCounts;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::results::{Evaluation, EvaluationRole};
 use osteon_common::statistics::PointStatistics;
@@ -94,19 +95,20 @@ impl Branch {
         self.search.point()
     }
 
+    /// Returns whether the decay of each realization is needed.
+    pub fn has_decays(&self) -> bool {
+        self.specification.has_decays()
+    }
+
     /// Takes the outcomes, in index order, of the pending point, and what another part has computed from
     /// these very outcomes, if it is known. Returns their assessment, for [`Search::anticipate`]; `None`
     /// if the branch has ended.
-    pub fn tell(
-        &mut self,
-        outcomes: &Arc<[Outcome]>,
-        known: Option<&Assessment>,
-    ) -> Option<Assessment> {
+    pub fn tell(&mut self, outcomes: &Outcomes, known: Option<&Assessment>) -> Option<Assessment> {
         let point = self.point()?;
         let Self { specification, search, evaluations } = self;
         let known = known.filter(|known| known.is_of(outcomes));
         let statistics = known.map_or_else(
-            || PointStatistics::from_outcomes(&specification.monte_carlo, &point, outcomes),
+            || PointStatistics::new(&specification.monte_carlo, &point, outcomes),
             |known| known.statistics,
         );
         let cost = search.cost(specification, &statistics, &point, outcomes);
@@ -115,13 +117,14 @@ impl Branch {
             role: EvaluationRole::default(),
             point,
             moments: statistics.moments,
+            decay: statistics.decay,
             cost: Some(cost),
             failures: FailureCounts::from_outcomes(outcomes),
             estimated_error: None,
         };
         let set = search.set();
-        let told = Arc::clone(outcomes);
-        search.tell(specification, row, statistics, Arc::clone(&told));
+        let told = outcomes.clone();
+        search.tell(specification, row, statistics, told.clone());
         *evaluations += 1;
         Some(Assessment { set, outcomes: told, statistics, cost: Some(cost) })
     }

@@ -1,9 +1,7 @@
 //! Candidate points of a search for speculative evaluation. Finding them does not change the
 //! search.
 
-use std::sync::Arc;
-
-use osteon_common::outcome::Outcome;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 
 use super::{Search, SearchPlan, Step};
@@ -23,7 +21,7 @@ impl Search {
     /// Returns the point that the search will ask for once it is given these outcomes of the
     /// pending point, followed by candidates after that one; at most `most` points, the most
     /// probable first. The assessment of the outcomes is cached until they are passed to `tell`.
-    pub fn candidates_after(&mut self, outcomes: &Arc<[Outcome]>, most: usize) -> Vec<Point> {
+    pub fn candidates_after(&mut self, outcomes: &Outcomes, most: usize) -> Vec<Point> {
         let (SearchPlan::Identification(identification), Step::Evaluate(point)) =
             (&self.plan, self.ask())
         else {
@@ -32,7 +30,7 @@ impl Search {
         let assessment = self.assess(&point, outcomes);
         let row = self.row(point, &assessment);
         let mut after = identification.clone();
-        after.tell(&self.specification, row, assessment.statistics, Arc::clone(outcomes));
+        after.tell(&self.specification, row, assessment.statistics, outcomes.clone());
         self.assessment = Some(assessment);
         let Some(next) = after.point() else {
             return Vec::new();

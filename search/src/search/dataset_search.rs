@@ -1,15 +1,13 @@
 //! The search for one set of data: from one start or several, then the derivatives at the best
 //! point.
 
-use std::sync::Arc;
-
 use osteon_common::ensemble::Germs;
-use osteon_common::inference::{MomentWeights, agreement};
+use osteon_common::inference::{DecayWeights, MomentWeights, agreement};
 use osteon_common::job::{JobSpecification, NoVariation, Objective, Range};
-use osteon_common::outcome::Outcome;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{Evaluation, EvaluationRole, GroupEnding, Moments, Status};
-use osteon_common::statistics::{PointStatistics, estimate, likelihood_cost};
+use osteon_common::statistics::{PointStatistics, decay_estimate, estimate, likelihood_cost};
 
 use super::method::MethodState;
 use super::reasons;
@@ -33,6 +31,8 @@ pub(super) struct DatasetSearch {
     data: Moments,
     /// Weights of the moments, if the cost is χ².
     weights: Option<MomentWeights>,
+    /// Weights of the moments and the mean decay, if decays were measured.
+    with_decay: Option<DecayWeights>,
     /// Number of the current start.
     start: u32,
     /// The search ends with this start, without derivatives and posterior.
@@ -61,7 +61,7 @@ pub(super) struct DatasetSearch {
 #[derive(Debug, Clone)]
 struct Best {
     row: Evaluation,
-    outcomes: Arc<[Outcome]>,
+    outcomes: Outcomes,
 }
 
 impl DatasetSearch {
@@ -93,6 +93,7 @@ impl DatasetSearch {
         let space = space_of_start(specification, set, start);
         let weighted = given.filter(|_| specification.objective == Objective::ChiSquare);
         let weights = weighted.and_then(|given| MomentWeights::of_data(given, set));
+        let with_decay = weighted.and_then(|given| DecayWeights::of_data(given, set));
         let measured = measured(specification, set);
         let method = MethodState::new(specification, data, measured, weights, space, tolerance);
         let mut search = Self {
@@ -100,6 +101,7 @@ impl DatasetSearch {
             set: u32::try_from(set).unwrap_or(u32::MAX),
             data,
             weights,
+            with_decay,
             start,
             is_of_one_start,
             space,
@@ -165,9 +167,13 @@ impl DatasetSearch {
         specification: &JobSpecification,
         statistics: &PointStatistics,
         point: &Point,
-        outcomes: &[Outcome],
+        outcomes: &Outcomes,
     ) -> f64 {
         let measured = measured(specification, self.set as usize);
+        if let Some(weights) = &self.with_decay {
+            let cost = |model| weights.cost(model, statistics.decay.unwrap_or(f64::NAN));
+            return statistics.cost_by(cost) + specification.penalty(point);
+        }
         let cost = match (specification.objective, measured, self.weights) {
             (Objective::Likelihood, Some(measured), _) => {
                 likelihood_cost(statistics, &specification.monte_carlo, point, outcomes, measured)
@@ -185,7 +191,7 @@ impl DatasetSearch {
         specification: &JobSpecification,
         mut row: Evaluation,
         statistics: PointStatistics,
-        outcomes: Arc<[Outcome]>,
+        outcomes: Outcomes,
     ) -> Evaluation {
         row.role =
             EvaluationRole { group: self.set, start: self.start, ..EvaluationRole::default() };
@@ -195,6 +201,7 @@ impl DatasetSearch {
             let start = self.best().map_or(0, |best| best.role.start);
             row.role = EvaluationRole { start, varied: Some(varied), ..row.role };
             row.moments = statistics.moments.filter(|_| self.fails_alike(&outcomes));
+            row.decay = statistics.decay.filter(|_| row.moments.is_some());
         } else {
             self.method.tell(row.cost.unwrap_or(f64::INFINITY), statistics.moments);
             self.evaluations += 1;
@@ -222,7 +229,7 @@ impl DatasetSearch {
         &mut self,
         specification: &JobSpecification,
         row: &mut Evaluation,
-        outcomes: Arc<[Outcome]>,
+        outcomes: Outcomes,
     ) {
         row.role.posterior = true;
         if self.evaluations == 0 {
@@ -247,8 +254,8 @@ impl DatasetSearch {
     }
 
     /// Returns the outcomes of the best evaluation.
-    pub(super) fn best_outcomes(&self) -> Option<&[Outcome]> {
-        self.best.as_ref().map(|best| &*best.outcomes)
+    pub(super) fn best_outcomes(&self) -> Option<&Outcomes> {
+        self.best.as_ref().map(|best| &best.outcomes)
     }
 
     /// Returns how the search ended, if it has.
@@ -257,9 +264,9 @@ impl DatasetSearch {
     }
 
     /// Returns whether the same realizations failed as at the best point.
-    fn fails_alike(&self, outcomes: &[Outcome]) -> bool {
+    fn fails_alike(&self, outcomes: &Outcomes) -> bool {
         self.best_outcomes().is_some_and(|best| {
-            best.iter().zip(outcomes).all(|(one, other)| one.is_err() == other.is_err())
+            best.iter().zip(outcomes.iter()).all(|(one, other)| one.is_err() == other.is_err())
         })
     }
 
@@ -267,7 +274,7 @@ impl DatasetSearch {
         &mut self,
         specification: &JobSpecification,
         row: Evaluation,
-        outcomes: Arc<[Outcome]>,
+        outcomes: Outcomes,
     ) {
         let Some(cost) = row.cost else { return };
         let tolerance = match specification.objective {
@@ -363,8 +370,10 @@ impl DatasetSearch {
         let estimated = self.best.as_ref().and_then(|Best { row, outcomes }| {
             Some((row, estimate(&specification.monte_carlo, &row.point, outcomes)?))
         });
+        let decay = self.best_outcomes();
+        let decay = decay.and_then(|best| decay_estimate(&specification.monte_carlo, best));
         let agreement = estimated.as_ref().and_then(|(row, estimate)| {
-            agreement(specification, self.set as usize, &row.point, estimate)
+            agreement(specification, self.set as usize, &row.point, estimate, decay.as_ref())
         });
         let errors = estimated.as_ref().map(|(_, estimate)| estimate.relative_errors());
         let evidence = reasons::Evidence {

@@ -1,9 +1,7 @@
 //! The searches of an identification, for one set of data after another.
 
-use std::sync::Arc;
-
 use osteon_common::job::{Data, Group, JobSpecification};
-use osteon_common::outcome::Outcome;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::results::{Evaluation, GroupEnding, Status};
 use osteon_common::statistics::PointStatistics;
@@ -46,7 +44,7 @@ impl IdentificationSearch {
         specification: &JobSpecification,
         statistics: &PointStatistics,
         point: &Point,
-        outcomes: &[Outcome],
+        outcomes: &Outcomes,
     ) -> f64 {
         self.present.cost(specification, statistics, point, outcomes)
     }
@@ -58,7 +56,7 @@ impl IdentificationSearch {
         specification: &JobSpecification,
         row: Evaluation,
         statistics: PointStatistics,
-        outcomes: Arc<[Outcome]>,
+        outcomes: Outcomes,
     ) -> Evaluation {
         let row = self.present.tell(specification, row, statistics, outcomes);
         self.begin_next(specification);
@@ -85,7 +83,7 @@ impl IdentificationSearch {
     }
 
     /// Returns the outcomes of the best evaluation of the current set.
-    pub(super) fn best_outcomes(&self) -> Option<&[Outcome]> {
+    pub(super) fn best_outcomes(&self) -> Option<&Outcomes> {
         self.present.best_outcomes()
     }
 

@@ -145,9 +145,12 @@ fn advice(specification: &JobSpecification, held_by_bounds: bool) -> String {
     choices.join(", or ")
 }
 
-/// Returns whether the lowest cost need not match both moments: that of a likelihood, or with priors.
+/// Returns whether the lowest cost need not match all moments: that of a likelihood, with priors, or of
+/// three moments by fewer parameters.
 fn is_compromise(specification: &JobSpecification) -> bool {
-    specification.objective == Objective::Likelihood || specification.has_priors()
+    specification.objective == Objective::Likelihood
+        || specification.has_priors()
+        || specification.has_decays()
 }
 
 /// Explains how far off the best point is after the last evaluation, unless it matches.
@@ -187,6 +190,9 @@ fn misfit(best: &Evaluation, agreement: &Agreement, specification: &JobSpecifica
     };
     let cost = match specification.objective {
         Objective::ChiSquare if specification.has_priors() => "best χ² with the priors' penalty",
+        Objective::ChiSquare if agreement.decay.is_some() => {
+            "best χ² (of at most 3 degrees of freedom)"
+        }
         Objective::ChiSquare => "best χ² (of at most 2 degrees of freedom)",
         Objective::Moments | Objective::Likelihood => "best cost",
     };
@@ -195,9 +201,15 @@ fn misfit(best: &Evaluation, agreement: &Agreement, specification: &JobSpecifica
         Objective::Likelihood => String::new(),
         _ => format!(", cost_tolerance is {:?}", specification.search.cost_tolerance),
     };
+    let decay = agreement.decay.map_or_else(String::new, |[difference, error]| {
+        let side = if difference < 0.0 { "below" } else { "above" };
+        let (percent, count) =
+            (rounded(100.0 * difference.abs()), rounded(difference.abs() / error));
+        format!(", its mean decay {percent} % {side} the data's ({count} standard errors)")
+    });
     format!(
         "the {cost} is {:.3e}{tolerance}; the model's mean velocity is {}, its coefficient of \
-         variation {}{held}",
+         variation {}{decay}{held}",
         best.cost.unwrap_or(f64::NAN),
         off(0),
         off(1)
@@ -239,6 +251,10 @@ fn holds_back(
     agreement: &Agreement,
     specification: &JobSpecification,
 ) -> bool {
+    if specification.has_decays() {
+        // The closed form knows nothing of decays.
+        return true;
+    }
     let step = match side {
         Side::Lower => -BEYOND,
         Side::Upper => BEYOND,

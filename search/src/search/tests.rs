@@ -5,6 +5,7 @@ use osteon_common::job::{
     Group, MonteCarlo, Objective, Prior, Range, Sampling, Search as SearchSettings, SearchMethod,
 };
 use osteon_common::outcome::FailureKind;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Parameter;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::realization::Ensemble;
@@ -41,14 +42,14 @@ fn specification(max_evaluations: u64) -> JobSpecification {
 const ERRORS: Option<EstimatedError> = Some(EstimatedError { median: 2e-5, largest: 3e-5 });
 
 /// Four velocities whose moments follow from e_L and the dispersion.
-fn outcomes(point: &Point) -> Arc<[Outcome]> {
+fn outcomes(point: &Point) -> Outcomes {
     let mean = 3900.0 * (point.0[1] / 17.7e9);
     let spread = mean * point.dispersion() / 4.0;
     [-1.0, 1.0, -1.0, 1.0].map(|sign| Ok(mean + sign * spread)).into()
 }
 
 /// Points with their outcomes.
-type Told = Vec<(Point, Arc<[Outcome]>)>;
+type Told = Vec<(Point, Outcomes)>;
 
 /// Runs the search to its end; returns it with all points and outcomes passed to it.
 fn run(specification: &JobSpecification) -> (Search, Told) {
@@ -297,7 +298,7 @@ fn a_controlled_search_goes_by_the_moments_of_the_law() {
         control_variate: true,
         ..MonteCarlo::default()
     };
-    let explained = |monte_carlo: &MonteCarlo, point: &Point| -> Arc<[Outcome]> {
+    let explained = |monte_carlo: &MonteCarlo, point: &Point| -> Outcomes {
         let ensemble = Ensemble::drawn(point, monte_carlo.germs()).unwrap();
         let speed = |index| {
             let bone = ensemble.bone(index).unwrap();
@@ -336,7 +337,7 @@ fn only_what_is_told_counts_whatever_was_looked_at_before() {
     let (mut looked, mut plain) = (Search::new(specification.clone()), Search::new(specification));
     while let Step::Evaluate(point) = plain.ask() {
         let right = outcomes(&point);
-        let wrong: Arc<[Outcome]> = right.iter().map(|v| v.map(|v| 1.1 * v)).collect();
+        let wrong: Outcomes = right.iter().map(|v| v.map(|v| 1.1 * v)).collect();
         looked.candidates_after(&wrong, 3);
         looked.tell(right.clone(), ERRORS);
         plain.tell(right, ERRORS);

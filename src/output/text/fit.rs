@@ -150,7 +150,8 @@ pub(super) fn uniqueness(
     let speed = (elasticity.rows()[0][0] / point.density()).sqrt();
     let speed = glued(&format!("√(c1111/ρ) = {} m/s", digits(speed, DIGITS)));
     let shown_below = identified::has_intervals(found);
-    if searched - usize::from(dispersion) < 2 {
+    let has_decays = specification.has_decays();
+    if searched - usize::from(dispersion) < if has_decays { 3 } else { 2 } {
         return if shown_below {
             String::new()
         } else {
@@ -159,8 +160,13 @@ pub(super) fn uniqueness(
         };
     }
     let known = match specification.objective {
+        _ if has_decays => "Two moments and the mean decay",
         Objective::Moments | Objective::ChiSquare => "Two moments",
         Objective::Likelihood => "The distribution of one velocity",
+    };
+    let fixed = match has_decays {
+        true => "the mean velocity, the coefficient of variation and the mean decay",
+        false => "the mean velocity and the coefficient of variation",
     };
     let nearest =
         is_reached(found, specification) && specification.search.method == SearchMethod::Newton;
@@ -171,11 +177,10 @@ pub(super) fn uniqueness(
         "many other parameter sets fit equally well, and this is one of them."
     };
     let mut text = format!(
-        "{known} cannot determine {searched} parameters. The data fix the mean velocity and the \
-         coefficient of variation; {this} Fix parameters that are known from other measurements \
+        "{known} cannot determine {searched} parameters. The data fix {fixed}; {this} Fix parameters that are known from other measurements \
          (`fixed = …`) to narrow the others down."
     );
-    if found.posterior().is_none() {
+    if found.posterior().is_none() && !has_decays {
         let needed = match specification.data.as_ref().map(|data| &data.measurements) {
             Some(Measurements::Moments { count: None, .. }) => "With `data.count`, a",
             _ => "A",

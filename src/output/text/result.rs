@@ -158,6 +158,7 @@ fn moments_and_cost(found: &Identification) -> String {
     let header = ["", "model ± standard error", "data", &interval.unwrap_or_default()];
     let mut rows = vec![header.map(str::to_owned)];
     rows.extend(moments(&found.velocity, found.data.as_ref()));
+    rows.extend(decay(found));
     if let Some(cost) = found.cost {
         let error = found.cost_standard_error.flatten().unwrap_or(f64::NAN);
         let (name, shown) = match found.objective {
@@ -186,6 +187,14 @@ fn moments(velocity: &Velocity, data: Option<&Data>) -> [[String; 4]; 2] {
         row("mean velocity (m/s)", Moment::Mean),
         row("coefficient of variation", Moment::CoefficientOfVariation),
     ]
+}
+
+/// Returns a row for the mean decay, if decays were measured.
+fn decay(found: &Identification) -> Option<[String; 4]> {
+    let (model, data) = (found.decay?, found.data.as_ref()?.decay?);
+    let model = measured(model.mean, model.standard_error);
+    let data = measured(data.mean, data.standard_error);
+    Some(["mean decay (dB/cm)".to_owned(), model, data, String::new()])
 }
 
 /// Returns a moment of the data and its interval, with the decimals of the interval's error;

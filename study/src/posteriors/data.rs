@@ -119,7 +119,8 @@ fn in_series(velocities: &[f64], count: usize, generator: &mut Generator) -> Dat
         (mean + shared * (of_subject - mean) + own * (velocity - mean), subject as u32)
     };
     let (velocities, subjects) = others.iter().enumerate().map(one).unzip();
-    let measurements = Measurements::Velocities { velocities, subjects: Some(subjects) };
+    let measurements =
+        Measurements::Velocities { velocities, subjects: Some(subjects), decays: None };
     Data { measurements, repeatability: 0.0 }
 }
 

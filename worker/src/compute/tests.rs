@@ -23,6 +23,7 @@ fn drawn(point: Point, germs: GermSource, first: u64, count: u32) -> Work {
         point,
         germs,
         random: RandomQuantities::default(),
+        with_decays: false,
     };
     Work { evaluation: Arc::new(evaluation), first, count }
 }
@@ -61,6 +62,7 @@ fn outcomes_are_those_of_the_solver_alone() {
                 RealizationResult {
                     outcome: Ok(arrival.velocity),
                     estimated_error: arrival.estimated_error,
+                    decay: 0.0,
                 }
             })
             .collect();

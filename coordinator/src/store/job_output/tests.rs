@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, MonteCarlo, Objective, Range, Search as SearchSettings};
-use osteon_common::outcome::Outcome;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::EstimatedError;
 use osteon_common::version::Program;
@@ -47,7 +47,7 @@ pub(crate) fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
             Step::Done(ending) => break ending,
             Step::Evaluate(point) => {
                 let spread = 2000.0 * point.dispersion();
-                let outcomes: Arc<[Outcome]> = [Ok(3900.0 - spread), Ok(3900.0 + spread)].into();
+                let outcomes: Outcomes = [Ok(3900.0 - spread), Ok(3900.0 + spread)].into();
                 let number = search.evaluations();
                 let estimated_error =
                     Some(EstimatedError { median: spread, largest: 2.0 * spread });

@@ -1,10 +1,10 @@
 //! Converts records to columns and back, with their checksums.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::outcome::{Outcome, decode, encode};
+use osteon_common::outcome::{decode, encode};
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Point};
 use osteon_common::results::EstimatedError;
 use osteon_common::version::Program;
@@ -132,21 +132,61 @@ pub(super) fn checksum(fields: &[&[u8]]) -> Vec<u8> {
     hasher.finalize().as_bytes().to_vec()
 }
 
-pub(super) fn pack_outcomes(outcomes: &[Outcome]) -> Vec<u8> {
+/// First byte of a blob whose records are followed by a decay each; no record begins with it.
+const DECAYS_FOLLOW: u8 = 0xFF;
+
+/// Packs outcomes, one record after the other; with decays, as [`with_decays`] says.
+pub(super) fn pack_outcomes(outcomes: &Outcomes) -> Vec<u8> {
     let mut packed = Vec::with_capacity(outcomes.len() * OUTCOME_BYTES);
-    for &outcome in outcomes {
+    for &outcome in outcomes.iter() {
         let (code, velocity) = encode(outcome);
         packed.push(code);
         packed.extend(velocity.to_le_bytes());
     }
-    packed
+    with_decays(packed, outcomes.decays())
 }
 
-fn unpack_outcomes(packed: &[u8]) -> Option<Arc<[Outcome]>> {
+/// Returns a blob of records followed by the decays of all of them as little-endian f64, with a byte
+/// before them that no record begins with; without decays, the records alone.
+pub(super) fn with_decays(mut records: Vec<u8>, decays: Option<&[f64]>) -> Vec<u8> {
+    if let Some(decays) = decays {
+        records.extend(decays.iter().flat_map(|decay| decay.to_le_bytes()));
+        records.insert(0, DECAYS_FOLLOW);
+    }
+    records
+}
+
+/// Returns the records of a blob, of `RECORD` bytes each, and the decays that follow them, if any; `None`
+/// if it is damaged.
+pub(super) fn without_decays<const RECORD: usize>(
+    packed: &[u8],
+) -> Option<(&[u8], Option<Vec<f64>>)> {
+    let Some((&DECAYS_FOLLOW, both)) = packed.split_first() else {
+        return Some((packed, None));
+    };
+    let count = both.len() / (RECORD + 8);
+    let (records, decays) = both.split_at_checked(count * RECORD)?;
+    let (decays, rest) = decays.as_chunks::<8>();
+    let whole = rest.is_empty() && decays.len() == count;
+    whole.then(|| (records, Some(decays.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())))
+}
+
+fn unpack_outcomes(packed: &[u8]) -> Option<Outcomes> {
+    let (packed, decays) = without_decays::<OUTCOME_BYTES>(packed)?;
     let (records, rest) = packed.as_chunks::<OUTCOME_BYTES>();
     let outcome =
         |[code, velocity @ ..]: &[u8; OUTCOME_BYTES]| decode(*code, f64::from_le_bytes(*velocity));
-    rest.is_empty().then(|| records.iter().map(outcome).collect()).flatten()
+    let outcomes: Option<Outcomes> =
+        rest.is_empty().then(|| records.iter().map(outcome).collect()).flatten();
+    let fits = |outcomes: &Outcomes, decays: &[f64]| {
+        let pairs = outcomes.iter().zip(decays);
+        pairs.into_iter().all(|(outcome, decay)| match outcome {
+            Ok(_) => decay.is_finite(),
+            Err(_) => decay.to_bits() == 0,
+        })
+    };
+    let outcomes = outcomes.filter(|all| decays.as_ref().is_none_or(|decays| fits(all, decays)))?;
+    Some(outcomes.with_decays(decays.map(Into::into)))
 }
 
 pub(super) fn pack_errors(errors: EstimatedError) -> Vec<u8> {

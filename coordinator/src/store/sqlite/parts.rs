@@ -8,7 +8,9 @@ use osteon_common::outcome::{RealizationResult, decode, encode};
 use osteon_common::version;
 use rusqlite::{Connection, params};
 
-use super::columns::{checksum, pack_point, pack_worker, unpack, unpack_worker};
+use super::columns::{
+    checksum, pack_point, pack_worker, unpack, unpack_worker, with_decays, without_decays,
+};
 use crate::core::ids::JobId;
 use crate::store::{PartPiece, PartRecord};
 
@@ -20,7 +22,7 @@ pub(super) const TABLE: &str = "
         point BLOB NOT NULL,             -- as of an evaluation
         worker TEXT NOT NULL,            -- that gave the results: PROCESS/INSTANCE HOST
         first INTEGER NOT NULL,          -- index
-        results BLOB NOT NULL,           -- per index: code byte, velocity, estimated error (f64)
+        results BLOB NOT NULL,           -- per index: code byte, velocity, estimated error (f64); with decays as of an evaluation
         fingerprint TEXT NOT NULL,       -- of the numerics
         checksum BLOB NOT NULL
     );
@@ -174,16 +176,21 @@ fn pack_results(results: &[RealizationResult]) -> Vec<u8> {
         packed.extend(velocity.to_le_bytes());
         packed.extend(result.estimated_error.to_le_bytes());
     }
-    packed
+    let has_decays = results.iter().any(|result| result.decay.to_bits() != 0);
+    let decays: Vec<f64> = results.iter().map(|result| result.decay).collect();
+    with_decays(packed, has_decays.then_some(&decays))
 }
 
 fn unpack_results(packed: &[u8]) -> Option<Vec<RealizationResult>> {
+    let (packed, decays) = without_decays::<RESULT_BYTES>(packed)?;
+    let mut decays = decays.into_iter().flatten();
     let (records, rest) = packed.as_chunks::<RESULT_BYTES>();
     let number = |bytes: &[u8]| bytes.try_into().ok().map(f64::from_le_bytes);
     let result = |[code, numbers @ ..]: &[u8; RESULT_BYTES]| {
         let (velocity, error) = numbers.split_at(8);
         let outcome = decode(*code, number(velocity)?)?;
-        let result = RealizationResult { outcome, estimated_error: number(error)? };
+        let (estimated_error, decay) = (number(error)?, decays.next().unwrap_or(0.0));
+        let result = RealizationResult { outcome, estimated_error, decay };
         result.is_consistent().then_some(result)
     };
     rest.is_empty().then(|| records.iter().map(result).collect()).flatten()

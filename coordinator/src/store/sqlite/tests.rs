@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
-use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
+use osteon_common::outcome::{FailureCounts, FailureKind};
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, EvaluationRole, GroupEnding, Status};
@@ -60,7 +61,7 @@ pub(super) fn evaluation(job: u64, number: u64) -> EvaluationRecord {
             0.4495,
             0.1 + number as f64,
         ]),
-        outcomes: Arc::from([Ok(3900.1), Err(FailureKind::NoConvergence), Ok(f64::MIN_POSITIVE)]),
+        outcomes: [Ok(3900.1), Err(FailureKind::NoConvergence), Ok(f64::MIN_POSITIVE)].into(),
         // As if every realization of the second one had failed.
         estimated_error: (number != 1)
             .then_some(EstimatedError { median: 2e-5, largest: f64::MIN_POSITIVE }),
@@ -107,6 +108,7 @@ pub(super) fn summary(job: u64) -> Summary {
         role: EvaluationRole { group: 1, start: 2, ..EvaluationRole::default() },
         point: evaluation(job, number).point,
         moments: (number == 1).then_some(Moments { mean: 0.1, coefficient_of_variation: 0.3 }),
+        decay: None,
         cost: Some(if number == 1 { 1e-300 } else { f64::INFINITY }),
         failures: FailureCounts::from_outcomes(&evaluation(job, number).outcomes),
         estimated_error: evaluation(job, number).estimated_error,
@@ -271,7 +273,7 @@ fn forgotten_jobs_are_gone_and_their_room_is_given_back() {
     let directory = tempfile::tempdir().unwrap();
     let mut store = SqliteStore::open(directory.path()).unwrap();
     let size = || fs::metadata(directory.path().join(FILE)).unwrap().len();
-    let large: Arc<[Outcome]> = vec![Ok(3900.0); 100_000].into();
+    let large: Outcomes = vec![Ok(3900.0); 100_000].into();
     for id in [1, 2] {
         store.put_job(&job(id)).unwrap();
         for number in 0..3 {
@@ -299,7 +301,7 @@ fn a_full_disk_is_named_and_nothing_is_half_written() {
     store.put_evaluation(&evaluation(1, 0), false).unwrap();
     let pages: i64 = store.connection.pragma_query_value(None, "page_count", |r| r.get(0)).unwrap();
     store.connection.pragma_update(None, "max_page_count", pages + 2).unwrap();
-    let outcomes: Arc<[Outcome]> = vec![Ok(3900.0); 100_000].into();
+    let outcomes: Outcomes = vec![Ok(3900.0); 100_000].into();
     let large = EvaluationRecord { outcomes, ..evaluation(1, 0) };
     let error = store.put_evaluation(&large, true).unwrap_err();
     assert!(matches!(error, StoreError::Full { .. }), "{error}");

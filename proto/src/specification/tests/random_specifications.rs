@@ -43,6 +43,7 @@ fn data() -> impl Strategy<Value = Data> {
                     name: format!("{name}{i}"),
                     velocities: vec![1999.0, 2000.0 + i as f64],
                     subjects: None,
+                    decays: None,
                     known: known_quantities(i, known),
                 };
                 Data::from_groups(names.iter().enumerate().map(group).collect())
@@ -95,7 +96,9 @@ fn with_noise(mut data: Data, (known, few, part): (bool, usize, f64)) -> Data {
     });
     data.repeatability = part * smallest.fold(f64::INFINITY, f64::min);
     match &mut data.measurements {
-        Measurements::Velocities { velocities, subjects } => *subjects = numbers(velocities.len()),
+        Measurements::Velocities { velocities, subjects, .. } => {
+            *subjects = numbers(velocities.len());
+        }
         Measurements::Groups(groups) => {
             for group in groups.iter_mut().step_by(2) {
                 group.subjects = numbers(group.velocities.len());

@@ -8,7 +8,7 @@ use osteon_common::settings::Method;
 use super::*;
 
 /// Returns the reason of a search all of whose points have these outcomes.
-fn reason(job: &JobSpecification, outcomes: [Outcome; 10]) -> String {
+fn reason(job: &JobSpecification, outcomes: [osteon_common::outcome::Outcome; 10]) -> String {
     let mut search = Search::new(Arc::new(job.clone()));
     while let Step::Evaluate(_) = search.ask() {
         search.tell(outcomes.into(), None);

@@ -22,7 +22,7 @@ fn fifty() -> Data {
 }
 
 /// Follows a branch to its end; returns its points with their outcomes and assessments.
-fn followed(mut branch: Branch) -> Vec<(Point, Arc<[Outcome]>, Assessment)> {
+fn followed(mut branch: Branch) -> Vec<(Point, Outcomes, Assessment)> {
     let mut points = Vec::new();
     while let Some(point) = branch.point() {
         let outcomes = outcomes(&point);
@@ -58,7 +58,7 @@ fn branches_know_the_points_of_their_parts() {
             if let Some((_, outcomes, assessment)) = known {
                 used[part] += 1;
                 search.anticipate(assessment.clone());
-                search.tell(Arc::clone(outcomes), ERRORS);
+                search.tell(outcomes.clone(), ERRORS);
             } else {
                 search.tell(outcomes(&point), ERRORS);
             }
@@ -123,7 +123,7 @@ fn assessments_are_used_as_far_as_they_hold() {
         search.anticipate(other.0.clone());
         // The first point of both groups is the same, but the costs there are not.
         let is_first = search.evaluations() == 0;
-        let told = if is_first { Arc::clone(&other.1) } else { outcomes(&point) };
+        let told = if is_first { other.1.clone() } else { outcomes(&point) };
         search.tell(told, ERRORS);
     }
     assert_eq!(search.summary(), plain.summary());

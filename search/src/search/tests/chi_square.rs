@@ -15,7 +15,7 @@ fn data(mean: f64, coefficient_of_variation: f64) -> Data {
 
 /// Velocities whose mean is proportional to e_L, and whose coefficient of variation, a quarter of
 /// the dispersion, falls as the square of e_L grows. There are so many that sampling adds little.
-fn coupled(point: &Point) -> Arc<[Outcome]> {
+fn coupled(point: &Point) -> Outcomes {
     let ratio = point.0[1] / 17.7e9;
     let (mean, variation) = (3900.0 * ratio, point.dispersion() / 4.0 / (ratio * ratio));
     let sign = |k: u32| if k.is_multiple_of(2) { -1.0 } else { 1.0 };
@@ -23,7 +23,7 @@ fn coupled(point: &Point) -> Arc<[Outcome]> {
 }
 
 /// Returns the ending and the best evaluation of a search with these outcomes.
-fn best(job: &JobSpecification, of: impl Fn(&Point) -> Arc<[Outcome]>) -> (Ending, Evaluation) {
+fn best(job: &JobSpecification, of: impl Fn(&Point) -> Outcomes) -> (Ending, Evaluation) {
     let mut search = Search::new(Arc::new(job.clone()));
     while let Step::Evaluate(point) = search.ask() {
         search.tell(of(&point), ERRORS);

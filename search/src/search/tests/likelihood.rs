@@ -3,7 +3,7 @@
 use super::*;
 
 /// Returns the speeds of the bones at a point, used as velocities.
-fn speeds(monte_carlo: &MonteCarlo, point: &Point) -> Arc<[Outcome]> {
+fn speeds(monte_carlo: &MonteCarlo, point: &Point) -> Outcomes {
     let ensemble = Ensemble::drawn(point, monte_carlo.germs()).unwrap();
     let speed = |index| {
         let bone = ensemble.bone(index).unwrap();

@@ -17,7 +17,7 @@ fn both(change: impl Fn(&mut JobSpecification)) -> [JobSpecification; 2] {
 /// Runs a job whose realizations are those of `outcomes`, and returns how it ended.
 fn ended(
     job: &JobSpecification,
-    outcomes: impl Fn(&Point) -> Arc<[Outcome]>,
+    outcomes: impl Fn(&Point) -> Outcomes,
 ) -> (Status, String, JobResult) {
     let mut search = Search::new(Arc::new(job.clone()));
     while let Step::Evaluate(point) = search.ask() {
@@ -86,7 +86,7 @@ fn distances_are_in_standard_errors_where_these_are_known() {
 
 #[test]
 fn failed_realizations_that_stop_a_search_are_named() {
-    let failing = |point: &Point| -> Arc<[Outcome]> {
+    let failing = |point: &Point| -> Outcomes {
         let mut found = outcomes(point).to_vec();
         if point.0[1] > 16e9 {
             found[0] = Err(FailureKind::NoArrival);
@@ -206,7 +206,7 @@ fn only_bounds_that_hold_the_search_back_are_named() {
     job.parameters[3] = Range::Free { start: 3e9, lower: 3e9, upper: 6e9 };
     job.search.method = SearchMethod::Newton;
     job.data = Some(Data::from_moments(8000.0, 0.03));
-    let corner = |point: &Point| -> Arc<[Outcome]> {
+    let corner = |point: &Point| -> Outcomes {
         let slower = (point.density() / 1600.0).sqrt() + point.0[3] / 1e12;
         outcomes(point).iter().map(|outcome| outcome.map(|velocity| velocity / slower)).collect()
     };

@@ -73,7 +73,7 @@ fn priors_choose_among_the_points_that_match() {
         specification.parameters[parameter] = Range::Free { start, lower, upper };
     }
     let of_density = |point: &Point| point.density() / 1598.8;
-    let told = |point: &Point| -> Arc<[Outcome]> {
+    let told = |point: &Point| -> Outcomes {
         let outcomes = outcomes(point);
         outcomes.iter().map(|outcome| outcome.map(|v| v / of_density(point))).collect()
     };

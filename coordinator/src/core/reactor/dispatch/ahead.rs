@@ -9,8 +9,6 @@
 //! [`refresh`] sees to it that a job with further parts always has something to send, and that no
 //! part begins before it is needed for that.
 
-use std::sync::Arc;
-
 use osteon_common::parameters::Point;
 use osteon_search::same_point;
 
@@ -61,7 +59,7 @@ pub(crate) fn keep_if_awaited(job: &mut Job, record: &EvaluationRecord) {
     if job.ahead.branches.iter().any(waits) {
         let prepared = PreparedEvaluation {
             part: None,
-            outcomes: Arc::clone(&record.outcomes),
+            outcomes: record.outcomes.clone(),
             estimated_error: record.estimated_error,
             workers: record.workers.clone(),
             assessment: None,

@@ -10,11 +10,10 @@
 //! slots, one at a time, and the batch is revoked (preempted) when there is other work for these
 //! slots. Therefore no client is charged for it.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobKind;
-use osteon_common::outcome::Outcome;
+use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 
 use super::{ahead, batches};
@@ -70,7 +69,7 @@ fn renumbered(mut known: PendingEvaluation, number: u64, now: Duration) -> Pendi
 
 /// Updates the candidates of a job whose evaluation is complete and on its way to the store: the
 /// next points of its search are already known, although it has not received the outcomes yet.
-pub(crate) fn prepare(turn: &mut Turn, id: JobId, outcomes: &Arc<[Outcome]>) {
+pub(crate) fn prepare(turn: &mut Turn, id: JobId, outcomes: &Outcomes) {
     let config = &turn.state.config;
     if let Some(job) = turn.state.jobs.get_mut(&id).filter(|job| speculates(config, job)) {
         let candidates = job.search.candidates_after(outcomes, CANDIDATES_MAX);

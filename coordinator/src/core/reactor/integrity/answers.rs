@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use osteon_common::outcome::RealizationResult;
+use osteon_proto::malformed::Malformed;
 
 use super::checks;
 use crate::core::batch::{Assignment, Batch, Purpose};
@@ -52,6 +53,11 @@ pub(crate) fn answered(
         workers::close(turn, worker, reason);
         return;
     }
+    if lacks_decays(turn.state, &assignment, &solved) {
+        let reason = Malformed::Missing { field: "decays" };
+        workers::close(turn, worker, CloseReason::Malformed(reason));
+        return;
+    }
     turn.state.note_answer(worker);
     if purpose.is_some() {
         overdue::answered(turn.state, worker, batch, turn.now);
@@ -78,6 +84,13 @@ pub(crate) fn answered(
     }
     jobs::settle(turn, assignment.job, assignment.attempt);
     departures::dismiss_if_drained(turn, worker);
+}
+
+/// Returns whether the job asks for decays and a velocity has none: the worker does not know of decays.
+fn lacks_decays(state: &State, assignment: &Assignment, solved: &[RealizationResult]) -> bool {
+    let job = state.jobs.get(&assignment.job);
+    job.is_some_and(|job| job.record.specification.has_decays())
+        && solved.iter().any(|one| one.outcome.is_ok() && one.decay.to_bits() == 0)
 }
 
 /// Revokes the duplicates of a batch that was answered.

@@ -37,7 +37,7 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
         complete_aside(turn, id);
         return;
     }
-    let Some((outcomes, estimated_error)) = evaluation.complete() else {
+    let Some((outcomes, estimated_error)) = evaluation.complete(job.search.has_decays()) else {
         return;
     };
     let (number, point) = (evaluation.number, evaluation.point);
@@ -248,7 +248,7 @@ fn store_prepared(turn: &mut Turn, id: JobId) -> bool {
         if let Some(assessment) = assessment {
             after.anticipate(assessment);
         }
-        after.tell(Arc::clone(&outcomes), estimated_error);
+        after.tell(outcomes.clone(), estimated_error);
         records.push(EvaluationRecord {
             job: id,
             number,

@@ -19,12 +19,13 @@ pub(super) fn wrong(worker: u64, batch: u64, index: u64, off: RealizationResult)
     let Ok(right) = velocity(index) else { panic!("a velocity") };
     let Ok(off_by) = off.outcome else { panic!("a velocity") };
     let outcome = Ok(f64::from_bits(right.to_bits() + off_by as u64));
-    let solved = vec![RealizationResult { outcome, estimated_error: off.estimated_error }];
+    let solved =
+        vec![RealizationResult { outcome, estimated_error: off.estimated_error, decay: 0.0 }];
     Event::Answered { worker: WorkerId(worker), batch: BatchId(batch), solved, elapsed_s: 0.1 }
 }
 
 pub(super) const ONE_BIT: RealizationResult =
-    RealizationResult { outcome: Ok(1.0), estimated_error: 0.0 };
+    RealizationResult { outcome: Ok(1.0), estimated_error: 0.0, decay: 0.0 };
 
 #[test]
 fn an_audited_batch_is_computed_by_another_worker() {
@@ -121,7 +122,7 @@ fn a_third_worker_decides_against_the_second() {
 fn an_estimated_error_is_an_answer_too() {
     let mut rig = rig(1, 3);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
-    let off = RealizationResult { outcome: Ok(0.0), estimated_error: 1e-9 };
+    let off = RealizationResult { outcome: Ok(0.0), estimated_error: 1e-9, decay: 0.0 };
     rig.check(wrong(2, 2, 0, off), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
     assert!(effects[0].starts_with("store ban 1: node (process 2)"), "{effects:?}");
