@@ -9,7 +9,7 @@ import tempfile
 import threading
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NoReturn
 
 from osteon import _program
 from osteon._jobs import Job
@@ -76,7 +76,7 @@ class Client:
         """The present state of a job."""
         for state in self.watch(job):
             return state
-        return self._unknown(job)
+        self._unknown(job)
 
     def watch(self, job: str) -> Iterator[JobState]:
         """The states of a job, at most one a second, until it has ended.
@@ -137,7 +137,9 @@ class Client:
         last = None
         for state in self.watch(job):
             last = state
-        return self._unknown(job) if last is None else last
+        if last is None:
+            self._unknown(job)
+        return last
 
     def cancel(self, job: str) -> None:
         """Cancels a job; one that has ended stays as it is."""
@@ -168,7 +170,7 @@ class Client:
             raise JobFailedError(result.reason or f"job {job} failed", 1)
         return result
 
-    def _unknown(self, job: str) -> Any:
+    def _unknown(self, job: str) -> NoReturn:
         raise InputError(f"the coordinator at {self._coordinator} says nothing of the job {job}")
 
     def _json(self, arguments: list[str]) -> Any:

@@ -151,15 +151,13 @@ def numbers(values: np.ndarray[Any, Any], name: object) -> np.ndarray[Any, Any]:
     try:
         found = values.astype(np.float64)
     except (TypeError, ValueError):
-        found = None
-    if found is None:
         refuse("data.velocities", f"the column {name!r} has values that are no numbers")
     wrong = np.flatnonzero(~np.isfinite(found))
     if len(wrong):
         more = f" (and {len(wrong) - 1} more rows)" if len(wrong) > 1 else ""
         message = f"the column {name!r} is {found[wrong[0]]} in row {wrong[0]}{more}; "
         refuse("data.velocities", message + "leave such rows out (frame.dropna())")
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def present(values: np.ndarray[Any, Any], name: object, field: str) -> None:

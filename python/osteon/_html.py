@@ -129,7 +129,8 @@ def of_groups(groups: list[Part]) -> list[str]:
             entry = known.get(name)
             cells.append("" if entry is None else with_error(entry.value, entry.standard_error))
         color = STATUS.get(group.status, (DOUBTFUL, ""))[0]
-        rows.append(row(str(getattr(group, "name", "")), *cells, group.status, color))
+        name = str(getattr(group, "name", ""))
+        rows.append(row(name, cells[0], cells[1], group.status, color))
     return rows
 
 

@@ -25,10 +25,12 @@ def case_of(case: CaseLike) -> _native.Case:
         return case
     if isinstance(case, (str, os.PathLike)):
         return _native.Case.read(case)
-    if isinstance(case, Mapping):
-        return _native.Case.parse(document(case), "json")
-    found = type(case).__name__
-    return refuse("case", f"is a {found}; give a path, a dictionary or an osteon.Case")  # type: ignore[no-any-return]
+    # Callers without a type checker may pass anything.
+    given: object = case
+    if isinstance(given, Mapping):
+        return _native.Case.parse(document(given), "json")
+    found = type(given).__name__
+    refuse("case", f"is a {found}; give a path, a dictionary or an osteon.Case")
 
 
 def document(table: Mapping[str, Any]) -> str:
@@ -57,7 +59,7 @@ def plain(value: Any, field: str) -> Any:
         return [plain(entry, f"{field}[{index}]") for index, entry in enumerate(value)]
     if hasattr(value, "to_numpy"):
         return array(np.asarray(value.to_numpy()), field)
-    return refuse(field, f"is a {type(value).__name__}; give numbers, texts, lists or dictionaries")
+    refuse(field, f"is a {type(value).__name__}; give numbers, texts, lists or dictionaries")
 
 
 def array(values: np.ndarray[Any, Any], field: str) -> Any:

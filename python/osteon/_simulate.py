@@ -230,7 +230,7 @@ def numbers(values: Any, field: str) -> Floats:
     try:
         return np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        return cast("Floats", refuse(field, f"are no numbers: {error}"))
+        refuse(field, f"are no numbers: {error}")
 
 
 PLAIN_BONE = {

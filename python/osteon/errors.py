@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple, NoReturn
 
 __all__ = [
     "CancelledError",
@@ -171,6 +171,6 @@ def simulation_error(kind: str, detail: str) -> SimulationError:
     return KINDS[kind](detail)
 
 
-def refuse(field: str, message: str) -> Any:
+def refuse(field: str, message: str) -> NoReturn:
     """Raises an :class:`InputError` about one field."""
     raise InputError(f"{field}: {message}" if field else message, [(field, message, None)])

@@ -19,7 +19,7 @@ const WRITTEN_BY_HAND: &str = "data";
 /// `OSTEON_WRITE_DOCS=1` writes the file instead.
 #[test]
 fn sections_of_python_are_the_committed() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/osteon/sections.py");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../python/osteon/sections.py");
     let text = module(&serde_json::from_str(&job_file::schema()).unwrap());
     if env::var_os("OSTEON_WRITE_DOCS").is_some() {
         fs::write(&path, &text).unwrap();
