@@ -14,6 +14,7 @@ from typing import Any, Literal, NoReturn
 from osteon import _program
 from osteon._jobs import Job
 from osteon._results import Result
+from osteon._scratch import Scratch
 from osteon._states import Credentials, JobState
 from osteon.errors import CancelledError, CoordinatorError, InputError, JobFailedError, refuse
 
@@ -159,8 +160,8 @@ class Client:
         """
         scratch = None
         if out is None:
-            scratch = tempfile.TemporaryDirectory(prefix="osteon-")
-            out = Path(scratch.name, "results")
+            scratch = Scratch()
+            out = scratch.path / "results"
         self._run(["fetch", job, "--out", os.fspath(out)])
         found = Result.read(out)
         result = Result(found.json, Path(out), scratch)

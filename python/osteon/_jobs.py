@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import subprocess
-import tempfile
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from osteon._data import DataLike, section
 from osteon._inputs import plain
 from osteon._progress import line
 from osteon._results import Result
+from osteon._scratch import Scratch
 from osteon._simulate import Ensemble
 from osteon._states import Credentials, JobProgress, JobState, environment, options
 from osteon.errors import (
@@ -226,10 +226,10 @@ class Job:
 
     def _run(self, kind: Kind, place: Place, progress: JobProgress) -> Result:
         text = self._check(kind).to_toml()
-        scratch = tempfile.TemporaryDirectory(prefix="osteon-")
-        file = Path(scratch.name, "job.toml")
+        scratch = Scratch()
+        file = scratch.path / "job.toml"
         file.write_text(text, encoding="utf-8")
-        out = Path(scratch.name, "results") if place.out is None else Path(place.out)
+        out = scratch.path / "results" if place.out is None else Path(place.out)
         command = "identify" if kind == "identification" else "propagate"
         arguments = [command, str(file), "--json", "--progress", "json", "--out", str(out)]
         arguments += place.options()
@@ -246,7 +246,7 @@ class Job:
             raise
         finally:
             follower.close()
-        return finished(ended, out, scratch if place.out is None else None, place)
+        return finished(ended, out, scratch, place)
 
     def __repr__(self) -> str:
         free = ", ".join(self.free) or "none"
@@ -342,7 +342,7 @@ def is_main_thread() -> bool:
 def finished(
     ended: _program.Ended,
     out: Path,
-    scratch: tempfile.TemporaryDirectory[str] | None,
+    scratch: Scratch | None,
     place: Place,
 ) -> Result:
     """The result of a run, or the exception that says why there is none."""

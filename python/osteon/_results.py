@@ -6,7 +6,6 @@ import csv
 import json
 import math
 import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from osteon._scratch import Scratch
 from osteon.errors import InputError, UnreadableFileError
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ class Result(Part):
         self,
         values: Mapping[str, Any],
         directory: Path | None = None,
-        scratch: tempfile.TemporaryDirectory[str] | None = None,
+        scratch: Scratch | None = None,
     ) -> None:
         super().__init__(values)
         self._directory = directory

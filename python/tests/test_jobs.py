@@ -47,7 +47,7 @@ class Run(TestCase):
     def test_a_job_from_arguments_and_frames_has_the_same(self) -> None:
         expected = digest_of("identify", EXAMPLES / "groups.toml")
         frame = groups_frame()
-        for velocities in (frame, polars.from_pandas(frame)):
+        for velocities in (frame, polars.DataFrame(frame.to_dict("list"))):
             data = {"velocities": velocities, "group": "patient"}
             job = osteon.Job(data=data, monte_carlo=SOBOL, **MANY)  # type: ignore[arg-type]
             self.assertEqual(job, osteon.Job.read(EXAMPLES / "groups.toml"))
@@ -156,8 +156,8 @@ class Refused(TestCase):
             ("monte_carlo.realisations", "did you mean `realizations`?", {"monte_carlo": {"realisations": 3}}),
             ("monte_carlo.seed", "", {"monte_carlo": {"seed": -1}}),
             ("search.max_evaluations", "", {"search": {"max_evaluations": 0}}),
-            ("parameters.density", "", {"parameters": SEARCHED | {"density": {"start": 1.0}}}),
-            ("layers.bone.thickness", "mm", {"layers": {"bone": {"thickness": 4.0}}}),
+            ("parameters.density.bounds", "is missing", {"parameters": SEARCHED | {"density": {"start": 1598.8}}}),
+            ("layers.bone.thickness", "above 0", {"layers": {"bone": {"thickness": 0.0}}}),
         ):  # fmt: skip
             with self.subTest(field):
                 self.refused(field, words, self.job, **given)
@@ -188,7 +188,7 @@ class Refused(TestCase):
 
     def test_an_unusual_value_is_a_warning(self) -> None:
         with self.assertWarns(osteon.OsteonWarning):
-            self.job(layers={"bone": {"thickness": 25e-3}})
+            self.job(layers={"bone": {"thickness": 0.4}})
 
 
 class Sections(TestCase):

@@ -61,7 +61,7 @@ class Simulate(TestCase):
     def test_pressures_have_coordinates(self) -> None:
         found = osteon.simulate(CASE_A, duration=10e-6, time_step=1e-7)
         self.assertEqual(found.pressures.shape, (14, 101))
-        self.assertEqual((found.times[0], found.times[-1]), (0.0, 10e-6))
+        self.assertEqual((found.times[0], found.times[-1]), (0.0, 100 * 1e-7))
         data = found.to_xarray()
         self.assertEqual(data["pressure"].dims, ("receiver", "time"))
         np.testing.assert_array_equal(data["receiver"], found.receivers)
@@ -234,7 +234,8 @@ class Memory(TestCase):
             with self.assertRaises(osteon.InputError):
                 osteon.simulate({"bone": OPTIMUM | {"density": -1.0}})
             if index % 10 == 0:
-                osteon.velocities(tensor, density=1598.8)
+                # Of few bones, because tables for new ones are kept, within a bound.
+                osteon.velocities(bones.draw(1, first=index % 50), density=1598.8)
             if index % 100 == 0:
                 osteon.simulate(case, duration=2e-6).pressures.sum()
 
