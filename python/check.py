@@ -21,6 +21,7 @@ def main():
     parser.add_argument("tests", nargs="*", help="names of tests; all, and the types, without any")
     arguments = parser.parse_args()
     check_version()
+    arguments.work = arguments.work.absolute()
     python = make(arguments.work / "venv", HERE / "tests" / "requirements.txt")
     install(python, arguments.work / "wheels", arguments.profile)
     variables = dict(os.environ, PYTHONDONTWRITEBYTECODE="1", MYPYPATH=str(HERE / "tests"))

@@ -2,7 +2,7 @@
 
     >>> import osteon
     >>> round(osteon.simulate("examples/cases/A.toml").velocity, 1)
-    3908.7
+    3908.8
 
 :func:`simulate` and :func:`velocities` solve cases, :func:`ensemble` draws random bones, :class:`Job`
 identifies, on this machine or on a cluster, and :class:`Client` speaks to a coordinator.

@@ -123,7 +123,7 @@ def simulate(
     >>> import osteon
     >>> found = osteon.simulate("examples/cases/A.toml")
     >>> round(found.velocity, 1)
-    3908.7
+    3908.8
     >>> found.pressures.shape
     (14, 1601)
     """

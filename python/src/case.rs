@@ -30,12 +30,14 @@ type PlainTraces<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
 #[pymethods]
 impl PyCase {
+    /// Reads and checks a case file (TOML or JSON).
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let case = errors::computed(py, || case_file::read(&path))?;
         case.map(|case| Self { case }).map_err(|error| errors::of_file(&error))
     }
 
+    /// Checks the text of a case file; `format` is toml or json.
     #[staticmethod]
     fn parse(py: Python<'_>, text: &str, format: &str) -> PyResult<Self> {
         let format = format_named(format)?;
@@ -43,31 +45,37 @@ impl PyCase {
         case.map(|case| Self { case }).map_err(|error| errors::of_content(&error))
     }
 
+    /// The complete case file, which reads back to the same bits.
     fn to_toml(&self) -> String {
         case_file::to_toml(&self.case)
     }
 
+    /// Density of the bone, kg/m³.
     #[getter]
     fn density(&self) -> f64 {
         self.case.bone.density
     }
 
+    /// Elasticity of the bone, Pa, as an array (6, 6): Kelvin-Mandel, order 11 22 33 23 31 12.
     #[getter]
     fn tensor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let rows = self.case.bone.elasticity.rows();
         PyArray2::from_vec2(py, &rows.map(|row| row.to_vec())).map_err(PyErr::from)
     }
 
+    /// Positions x1 of the receivers along the bone, m.
     #[getter]
     fn receivers<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.case.setup.probe.receivers.positions().collect())
     }
 
+    /// What is allowed but unusual.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         case_warnings(&self.case).iter().map(ToString::to_string).collect()
     }
 
+    /// The same case with another bone: elasticity in Pa (6, 6), density in kg/m³.
     fn with_bone(&self, tensor: [[f64; 6]; 6], density: f64) -> PyResult<Self> {
         let mut case = self.case;
         case.bone.elasticity = Elasticity::new(tensor)

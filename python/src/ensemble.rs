@@ -1,13 +1,11 @@
 //! Random elasticity tensors, to the bit those of a job.
 
 use numpy::{PyArray1, PyArray3, PyArrayMethods as _};
-use osteon_common::case::Setup;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::ensemble::{ElasticityLaw, Germs};
 use osteon_common::realization::Ensemble;
 use pyo3::prelude::*;
 
-use crate::case::PyCase;
 use crate::errors;
 use crate::parallel::Plan;
 
@@ -21,19 +19,19 @@ enum Source {
     /// Any mean, with independent germs.
     Law { law: ElasticityLaw, seed: u64 },
     /// The start of a job, with its germs.
-    Job { ensemble: Box<Ensemble>, setup: Box<Setup> },
+    Job(Box<Ensemble>),
 }
 
 impl PyEnsemble {
     /// Creates the ensemble of a job.
-    pub(crate) fn of_job(ensemble: Ensemble, setup: Setup) -> Self {
-        Self { source: Source::Job { ensemble: Box::new(ensemble), setup: Box::new(setup) } }
+    pub(crate) fn of_job(ensemble: Ensemble) -> Self {
+        Self { source: Source::Job(Box::new(ensemble)) }
     }
 
     fn tensor(&self, index: u64) -> Result<Elasticity, String> {
         let drawn = match &self.source {
             Source::Law { law, seed } => law.realize(&Germs::draw(*seed, index)),
-            Source::Job { ensemble, .. } => ensemble.bone(index).map(|bone| bone.elasticity),
+            Source::Job(ensemble) => ensemble.bone(index).map(|bone| bone.elasticity),
         };
         drawn.map_err(|error| format!("the tensor of realization {index} {error}"))
     }
@@ -72,26 +70,5 @@ impl PyEnsemble {
             numbers.extend(tensor.rows().as_flattened());
         }
         PyArray1::from_vec(py, numbers).reshape([count, 6, 6])
-    }
-
-    /// Returns the complete case of one realization, in the setup of the job or of `case`.
-    fn case(&self, index: u64, case: Option<&PyCase>, density: Option<f64>) -> PyResult<PyCase> {
-        let elasticity =
-            self.tensor(index).map_err(|detail| errors::no_velocity("not_finite", &detail))?;
-        let mut drawn = match (&self.source, case) {
-            (Source::Job { ensemble, setup }, _) => {
-                let bone = ensemble
-                    .bone(index)
-                    .map_err(|error| errors::no_velocity("not_finite", &error.to_string()))?;
-                osteon_common::case::Case { setup: ensemble.setup(index, setup), bone }
-            }
-            (Source::Law { .. }, Some(case)) => case.case,
-            (Source::Law { .. }, None) => {
-                return Err(errors::bad_input("case", "is missing: it gives the setup"));
-            }
-        };
-        drawn.bone.elasticity = elasticity;
-        drawn.bone.density = density.unwrap_or(drawn.bone.density);
-        Ok(PyCase { case: drawn })
     }
 }

@@ -20,6 +20,7 @@ pub(crate) struct PyJob {
 
 #[pymethods]
 impl PyJob {
+    /// Reads and checks a job file.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, kind: &str) -> PyResult<Self> {
         let kind = kind_named(kind)?;
@@ -27,6 +28,7 @@ impl PyJob {
         found.map(|specification| Self { specification }).map_err(|error| errors::of_file(&error))
     }
 
+    /// Checks the text of a job file in `directory`.
     #[staticmethod]
     fn parse(
         py: Python<'_>,
@@ -43,20 +45,24 @@ impl PyJob {
             .map_err(|error| errors::of_content(&error))
     }
 
+    /// The complete job file, with defaults and data, which reads back to the same bits.
     fn to_toml(&self, py: Python<'_>) -> PyResult<String> {
         errors::computed(py, || job_file::to_toml(&self.specification))
     }
 
+    /// What is allowed but unusual.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         job_warnings(&self.specification).iter().map(ToString::to_string).collect()
     }
 
+    /// Number of realizations of each evaluation.
     #[getter]
     fn realizations(&self) -> u64 {
         self.specification.monte_carlo.realizations
     }
 
+    /// Names of the parameters that are searched.
     #[getter]
     fn free(&self) -> Vec<&'static str> {
         self.specification.free().map(|parameter| parameter.name()).collect()
@@ -68,7 +74,7 @@ impl PyJob {
         let ensemble = specification
             .ensemble(&specification.start())
             .map_err(|error| errors::bad_input("parameters", error.to_string()))?;
-        Ok(PyEnsemble::of_job(ensemble, specification.setup))
+        Ok(PyEnsemble::of_job(ensemble))
     }
 
     fn __eq__(&self, other: &Self) -> bool {
@@ -86,12 +92,6 @@ fn kind_named(name: &str) -> PyResult<JobKind> {
                 format!("is {name:?}; it must be identification or propagation"),
             )
         })
-}
-
-/// Returns the JSON Schema of a job file.
-#[pyfunction]
-pub(crate) fn job_schema() -> String {
-    job_file::schema()
 }
 
 /// Returns version and numerics revision.

@@ -21,7 +21,7 @@ mod _native {
     #[pymodule_export]
     use super::ensemble::PyEnsemble;
     #[pymodule_export]
-    use super::job::{PyJob, job_schema, version};
+    use super::job::{PyJob, version};
     #[pymodule_export]
     use super::velocities::{velocities_of_cases, velocities_of_tensors};
 }

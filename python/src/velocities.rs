@@ -81,7 +81,7 @@ fn bones(
     densities: &PyReadonlyArray1<'_, f64>,
 ) -> PyResult<Vec<Bone>> {
     let (tensors, densities) = (tensors.as_array(), densities.as_array());
-    let &[count, rows, columns] = tensors.shape() else { unreachable!("the array has 3 axes") };
+    let (count, rows, columns) = tensors.dim();
     if [rows, columns] != [6, 6] {
         let found = format!("has the shape ({count}, {rows}, {columns}); it must be (n, 6, 6)");
         return Err(errors::bad_input("tensors", found));

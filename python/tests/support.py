@@ -38,6 +38,28 @@ SEARCHED = OPTIMUM | {
 """The parameters of examples/groups.toml."""
 
 
+FREE = {
+    "density": {"start": 1750.0, "bounds": [1500.0, 2000.0]},
+    "longitudinal_young_modulus": {"start": 20.0e9, "bounds": [12.0e9, 25.0e9]},
+    "longitudinal_poisson_ratio": {"start": 0.32, "bounds": [0.2, 0.45]},
+    "longitudinal_shear_modulus": {"start": 4.5e9, "bounds": [3.0e9, 6.5e9]},
+    "transverse_young_modulus": {"start": 12.0e9, "bounds": [8.0e9, 16.0e9]},
+    "transverse_poisson_ratio": {"start": 0.38, "bounds": [0.2, 0.5]},
+    "dispersion": {"start": 0.15, "bounds": [0.02, 0.3]},
+}
+"""The parameters of examples/fast.toml."""
+
+
+def small_job() -> osteon.Job:
+    """A search of few realizations."""
+    return osteon.Job(
+        parameters=FREE,
+        data={"mean": 3908.0, "coefficient_of_variation": 0.0267, "count": 1000},
+        monte_carlo={"sampling": "sobol", "realizations": 64, "control_variate": True},
+        search={"method": "newton"},
+    )
+
+
 def program(*words: object) -> str:
     """Runs the program of the package; its output."""
     environment = dict(os.environ)
