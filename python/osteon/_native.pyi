@@ -7,6 +7,17 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "Case",
+    "CheckedJob",
+    "Ensemble",
+    "arrival",
+    "traces",
+    "velocities_of_cases",
+    "velocities_of_tensors",
+    "version",
+]
+
 _Floats = NDArray[np.float64]
 _Path = str | os.PathLike[str]
 _Format = Literal["toml", "json"]
@@ -73,8 +84,8 @@ def velocities_of_tensors(
     densities: _Floats,
     case: Case,
     threads: int,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int], object] | None,
 ) -> tuple[_Floats, NDArray[np.uint8]]: ...
 def velocities_of_cases(
-    cases: Sequence[Case], threads: int, progress: Callable[[int], object] | None = None
+    cases: Sequence[Case], threads: int, progress: Callable[[int], object] | None
 ) -> tuple[_Floats, NDArray[np.uint8]]: ...

@@ -229,14 +229,18 @@ class Result(Part):
         """The directory of the result's files."""
         return self._directory
 
-    def table(self, name: str) -> dict[str, NDArray[Any]] | None:
-        """A table of the result by columns: `history`, `realizations`, `groups`, `comparison` or
-        `posterior`; None if it has no such table. docs/results.md explains the columns."""
-        if name not in TABLES:
-            raise InputError(f"there is no table {name!r}; there are: {', '.join(TABLES)}")
+    @property
+    def tables(self) -> list[str]:
+        """Names of the tables that it has: of `history`, `realizations`, `groups`, `comparison` and
+        `posterior`."""
+        return [name for name in TABLES if self._path(name) is not None]
+
+    def table(self, name: str) -> dict[str, NDArray[Any]]:
+        """A table of the result by columns; docs/results.md explains them."""
         path = self._path(name)
-        if path is None:
-            return None
+        if name not in TABLES or path is None:
+            has = ", ".join(self.tables) or "none"
+            raise InputError(f"the result has no table {name!r}; it has: {has}")
         with path.open(encoding="utf-8", newline="") as file:
             rows = csv.reader(file)
             header = next(rows, [])
@@ -257,22 +261,21 @@ class Result(Part):
         import pandas
 
         def frame(name: str) -> pandas.DataFrame | None:
-            table = self.table(name)
-            return None if table is None else pandas.DataFrame(table)
+            return pandas.DataFrame(self.table(name)) if name in self.tables else None
 
         return Tables(*(frame(name) for name in TABLES))
 
     def to_arviz(self) -> xarray.DataTree:
-        """The posterior and the data as a tree for ArviZ (package `arviz-base`).
+        """The draws of the posterior as a tree for ArviZ (package `arviz-base`).
 
         Raises:
             InputError: the job had no posterior, or it has groups.
         """
         from arviz_base import from_dict
 
-        draws = self.table("posterior")
-        if draws is None:
+        if "posterior" not in self.tables:
             raise InputError("the result has no posterior; add a section `posterior` to the job")
+        draws = self.table("posterior")
         if "group" in draws:
             raise InputError("the result has groups; take their draws from table('posterior')")
         names = [key for key in draws if key not in ("draw", "log_density")]
@@ -280,10 +283,6 @@ class Result(Part):
             "posterior": {name: draws[name][np.newaxis] for name in names},
             "sample_stats": {"lp": draws["log_density"][np.newaxis]},
         }
-        realizations = self.table("realizations")
-        if realizations is not None:
-            velocities = realizations["velocity"]
-            groups["posterior_predictive"] = {"velocity": velocities[np.newaxis]}
         return from_dict(groups)
 
     def to_mat(self, path: str | os.PathLike[str]) -> None:
@@ -291,10 +290,8 @@ class Result(Part):
         from scipy.io import savemat
 
         found = {"result": for_matlab(self.json)}
-        for name in TABLES:
-            table = self.table(name)
-            if table is not None:
-                found[name] = {key: column_of(values) for key, values in table.items()}
+        for name in self.tables:
+            found[name] = {key: column_of(values) for key, values in self.table(name).items()}
         savemat(os.fspath(path), found, long_field_names=True, oned_as="column")
 
     def __repr__(self) -> str:

@@ -52,7 +52,7 @@ class Package(TestCase):
         self.assertGreater(tried, 10)
 
     def doctest(self, module: object) -> int:
-        results = doctest.testmod(module)  # type: ignore[arg-type]
+        results = doctest.testmod(module, verbose=False)  # type: ignore[arg-type]
         self.assertEqual(results.failed, 0)
         return results.attempted
 

@@ -42,12 +42,16 @@ def words(html: str) -> str:
 class Search(TestCase):
     """One search of each kind for all tests."""
 
+    free: osteon.Result
+    groups: osteon.Result
+    posterior: osteon.Result
+
     @classmethod
     def setUpClass(cls) -> None:
         cls.free = small_job().identify(progress=False)
         cls.groups = osteon.Job.read(EXAMPLES / "groups.toml").identify(progress=False)
         job = osteon.Job(
-            parameters=SEARCHED,  # type: ignore[arg-type]
+            parameters=SEARCHED,
             data={"mean": 3908.0, "coefficient_of_variation": 0.0267, "count": 100},
             monte_carlo={"sampling": "sobol", "realizations": 64},
             search={"method": "newton"},
@@ -60,24 +64,34 @@ class Search(TestCase):
         self.assertEqual(result.parameters, values["parameters"])
         self.assertEqual(result.velocity.mean, values["velocity"]["mean"])
         self.assertEqual(result.velocity.mean_standard_error, values["velocity"]["standard_error"]["mean"])
-        self.assertEqual(result.data.mean, values["data"]["mean"])
+        data = result.data
+        assert data is not None
+        self.assertEqual(data.mean, values["data"]["mean"])
         self.assertEqual(len(result.free_directions), 5)
         self.assertFalse(result.estimates["density"].is_determined)
         self.assertEqual(result.estimates["density"].value, result.parameters["density"])
-        group = self.groups.groups["A" if "A" in self.groups.groups else next(iter(self.groups.groups))]
+        group = next(iter(self.groups.groups.values()))
         self.assertTrue(group.estimates["bulk_velocity"].is_determined)
 
     def test_tables_are_arrays_and_frames(self) -> None:
         history = self.free.table("history")
         self.assertEqual(history["evaluation"].tolist(), list(range(self.free.evaluations)))
         tables = self.groups.to_pandas()
+        assert tables.groups is not None
+        assert tables.realizations is not None
+        assert tables.comparison is not None
         self.assertEqual(list(tables.groups["group"]), list(self.groups.groups))
         self.assertEqual(len(tables.realizations), 256 * len(self.groups.groups))
         pairs = len(self.groups.groups) * (len(self.groups.groups) - 1) // 2
         self.assertEqual(len(tables.comparison), pairs)
         self.assertIsNone(self.free.to_pandas().groups)
-        with self.assertRaises(osteon.InputError):
-            self.free.table("histroy")
+        self.refused_table("histroy")
+        self.refused_table("groups")
+
+    def refused_table(self, name: str) -> None:
+        with self.assertRaises(osteon.InputError) as caught:
+            self.free.table(name)
+        self.assertIn("history, realizations", str(caught.exception))
 
     def test_a_page_says_first_what_is_not_fixed_and_last_the_digest(self) -> None:
         text = words(self.free._repr_html_())
@@ -122,6 +136,7 @@ class Search(TestCase):
     def test_files_live_as_long_as_the_result(self) -> None:
         result = osteon.Job(parameters=SEARCHED, monte_carlo={"realizations": 5}).propagate(progress=False)
         directory = result.directory
+        assert directory is not None
         self.assertTrue((directory / "realizations.csv").is_file())
         del result
         self.assertFalse(directory.exists())

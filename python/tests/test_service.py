@@ -14,6 +14,7 @@ from support import OPTIMUM, Service, TestCase, program, small_job
 
 class Plain(TestCase):
     service: Service
+    client: osteon.Client
 
     @classmethod
     def setUpClass(cls) -> None:

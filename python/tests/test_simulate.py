@@ -7,7 +7,6 @@ import multiprocessing
 import os
 import pickle
 import threading
-import tomllib
 import unittest
 from typing import Any
 
@@ -56,7 +55,7 @@ class Simulate(TestCase):
         self.assertEqual(osteon.Case.parse(case.to_toml(), "toml"), case)
         self.assertEqual(pickle.loads(pickle.dumps(case)), case)
         self.assertNotEqual(case.with_bone(case.tensor, 1700.0), case)
-        self.assertEqual(tomllib.loads(case.to_toml())["bone"]["density"], 1598.8)
+        self.assertEqual(case.density, 1598.8)
 
     def test_pressures_have_coordinates(self) -> None:
         found = osteon.simulate(CASE_A, duration=10e-6, time_step=1e-7)
@@ -201,14 +200,13 @@ class Ensembles(TestCase):
         np.testing.assert_array_equal(drawn, job)
         for index in (0, 3):
             text = program("draw", EXAMPLES / "optimum.toml", "--index", index)
-            mandel = tomllib.loads(text)["bone"]["mandel"]
-            self.assertEqual(drawn[index].tolist(), mandel)
+            np.testing.assert_array_equal(drawn[index], osteon.Case.parse(text, "toml").tensor)
 
     def test_a_sobol_job_draws_its_own_points(self) -> None:
         job = EXAMPLES / "fast.toml"
         drawn = osteon.Job.read(job).ensemble().draw(1, first=5)
-        mandel = tomllib.loads(program("draw", job, "--index", 5))["bone"]["mandel"]
-        self.assertEqual(drawn[0].tolist(), mandel)
+        text = program("draw", job, "--index", 5)
+        np.testing.assert_array_equal(drawn[0], osteon.Case.parse(text, "toml").tensor)
 
     def test_what_is_refused_names_the_argument(self) -> None:
         for field, arguments in (
