@@ -172,6 +172,12 @@ pub trait Store {
     /// each of them again to learn which.
     fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError>;
 
+    /// Does some of the work that no record has to wait for: what is durable is so already. Returns
+    /// whether there is more.
+    fn settle(&mut self) -> bool {
+        false
+    }
+
     /// Returns all jobs, in the order of their identifiers.
     ///
     /// # Errors

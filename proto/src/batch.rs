@@ -8,7 +8,6 @@ use osteon_common::outcome::{self, RealizationResult};
 use crate::announced::Received;
 use crate::evaluation::EvaluationInput;
 use crate::malformed::Malformed;
-use crate::realizations;
 use crate::v1;
 
 /// The work of one batch: realizations `first`, `first + 1`, … `first + count - 1` of one
@@ -65,19 +64,27 @@ pub fn answer_to_message(
 /// If the lengths differ, if a code and a velocity do not encode an outcome, or if an estimated
 /// error is not allowed for its outcome.
 pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationResult>, Malformed> {
-    let outcomes = realizations::unpack(&message.codes, &message.velocities)?;
-    let (found, expected) = (message.estimated_errors.len(), outcomes.len());
-    if found != expected {
-        return Err(Malformed::WrongLength { field: "estimated_errors", found, expected });
+    let v1::BatchResult { codes, velocities, estimated_errors, .. } = message;
+    let expected = codes.len();
+    for (field, found) in
+        [("velocities", velocities.len()), ("estimated_errors", estimated_errors.len())]
+    {
+        if found != expected {
+            return Err(Malformed::WrongLength { field, found, expected });
+        }
     }
-    let pairs = outcomes.into_iter().zip(&message.estimated_errors).enumerate();
-    pairs
-        .map(|(index, (outcome, &estimated_error))| {
-            let solved = RealizationResult { outcome, estimated_error };
-            let unsound = Malformed::EstimatedError { index, value: estimated_error };
-            solved.is_consistent().then_some(solved).ok_or(unsound)
-        })
-        .collect()
+    let rows = codes.iter().zip(velocities).zip(estimated_errors).enumerate();
+    let mut results = Vec::with_capacity(expected);
+    for (index, ((&code, &velocity), &estimated_error)) in rows {
+        let outcome = outcome::decode(code, velocity);
+        let outcome = outcome.ok_or(Malformed::Outcome { index, code, velocity })?;
+        let solved = RealizationResult { outcome, estimated_error };
+        if !solved.is_consistent() {
+            return Err(Malformed::EstimatedError { index, value: estimated_error });
+        }
+        results.push(solved);
+    }
+    Ok(results)
 }
 
 #[cfg(test)]

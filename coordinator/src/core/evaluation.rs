@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::outcome::{Outcome, RealizationResult, encode};
+use osteon_common::outcome::{FailureKind, Outcome, RealizationResult, encode};
 use osteon_common::parameters::Point;
 use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
@@ -108,14 +108,6 @@ impl PendingEvaluation {
         }
     }
 
-    /// Returns the result of an index, if it is filled, and the worker that gave it.
-    pub(crate) fn result(&self, index: u64) -> Option<(RealizationResult, &WorkerName)> {
-        let index = usize::try_from(index).ok()?;
-        let result = (*self.results.get(index)?)?;
-        let owner = usize::try_from(*self.owners.get(index)?).ok()?;
-        Some((result, self.workers.get(owner)?))
-    }
-
     /// Queues exactly the indices that are not filled: nothing of it has been sent yet.
     pub(crate) fn queue_unfilled(&mut self) {
         self.queue = runs(&self.results, Option::is_none).into();
@@ -215,8 +207,9 @@ impl PendingEvaluation {
             self.results.resize(end, None);
             self.owners.resize(end, 0);
         }
-        let results = self.results.iter_mut().zip(&mut self.owners).skip(first);
-        for ((result, owned), solved) in results.zip(solved) {
+        let results = self.results.get_mut(first..).unwrap_or_default();
+        let owners = self.owners.get_mut(first..).unwrap_or_default();
+        for ((result, owned), solved) in results.iter_mut().zip(owners).zip(solved) {
             if result.is_none() {
                 *result = Some(*solved);
                 *owned = owner;
@@ -257,6 +250,31 @@ impl PendingEvaluation {
         self.workers.get(usize::try_from(*owner).ok()?).cloned()
     }
 
+    /// Passes the filled results of `indices` to `visit`, in runs of at most `most` of the same worker:
+    /// the first index, the worker, and the results, none of which is empty.
+    pub(crate) fn visit_runs(
+        &self,
+        indices: Indices,
+        most: usize,
+        mut visit: impl FnMut(u64, &WorkerName, &[Option<RealizationResult>]),
+    ) {
+        let end = usize::try_from(indices.end()).unwrap_or(usize::MAX).min(self.results.len());
+        let mut first = usize::try_from(indices.first).unwrap_or(usize::MAX);
+        while let Some(rest) = self.results.get(first..end).filter(|rest| !rest.is_empty()) {
+            let owners = self.owners.get(first..end).unwrap_or_default();
+            let owner = owners.first().copied();
+            let same = |(result, of): &(&Option<RealizationResult>, &u32)| {
+                result.is_some() && Some(**of) == owner
+            };
+            let count = rest.iter().zip(owners).take(most).take_while(same).count();
+            let by = owner.and_then(|owner| self.workers.get(usize::try_from(owner).ok()?));
+            if let Some(by) = by.filter(|_| count > 0) {
+                visit(first as u64, by, &rest[..count]);
+            }
+            first += count.max(1);
+        }
+    }
+
     /// Returns whether every index has an outcome and no check of them is pending.
     pub(crate) fn is_settled(&self) -> bool {
         self.filled >= self.realizations
@@ -284,14 +302,25 @@ impl PendingEvaluation {
     /// Returns all outcomes in index order and the estimated errors of the successes, once it is
     /// settled.
     pub fn complete(&self) -> Option<(Arc<[Outcome]>, Option<EstimatedError>)> {
-        if !self.is_settled() {
+        Some((self.outcomes()?, self.estimated_error()))
+    }
+
+    /// Returns all outcomes in index order, once it is settled.
+    pub(crate) fn outcomes(&self) -> Option<Arc<[Outcome]>> {
+        if !self.is_settled() || self.results.iter().any(Option::is_none) {
             return None;
         }
-        let outcomes: Option<_> =
-            self.results.iter().map(|result| result.map(|it| it.outcome)).collect();
+        // None is empty. With a known length they are written to their place at once.
+        let empty = Err(FailureKind::NotFinite);
+        Some(self.results.iter().map(|result| result.map_or(empty, |it| it.outcome)).collect())
+    }
+
+    /// Returns the estimated errors of the successes so far.
+    pub(crate) fn estimated_error(&self) -> Option<EstimatedError> {
+        let mut errors = Vec::with_capacity(self.results.len());
         let successes = self.results.iter().flatten().filter(|solved| solved.outcome.is_ok());
-        let errors = successes.map(|solved| solved.estimated_error).collect();
-        Some((outcomes?, quantile::estimated_error(errors)))
+        errors.extend(successes.map(|solved| solved.estimated_error));
+        quantile::estimated_error(errors)
     }
 }
 

@@ -84,23 +84,12 @@ pub(crate) fn take_unsaved(evaluation: &mut PendingEvaluation, job: JobId) -> Op
     if evaluation.unsaved.is_empty() || !evaluation.disputes.is_empty() {
         return None;
     }
-    let mut pieces: Vec<PartPiece> = Vec::new();
+    let mut pieces = Vec::new();
     for indices in std::mem::take(&mut evaluation.unsaved) {
-        for index in indices.first..indices.end() {
-            let Some((result, by)) = evaluation.result(index) else {
-                continue;
-            };
-            match pieces.last_mut() {
-                Some(last)
-                    if last.by == *by
-                        && last.first + last.results.len() as u64 == index
-                        && last.results.len() < PIECE_MAX =>
-                {
-                    last.results.push(result);
-                }
-                _ => pieces.push(PartPiece { first: index, by: by.clone(), results: vec![result] }),
-            }
-        }
+        evaluation.visit_runs(indices, PIECE_MAX, |first, by, run| {
+            let results = run.iter().copied().flatten().collect();
+            pieces.push(PartPiece { first, by: by.clone(), results });
+        });
     }
     let point = evaluation.point;
     (!pieces.is_empty()).then_some(PartRecord { job, point, pieces })

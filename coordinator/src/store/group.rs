@@ -13,6 +13,8 @@ pub(crate) const GROUP_RECORDS_MAX: usize = 256;
 /// Maximum size of a group of several records, bytes: a large record is written alone, so that small
 /// ones do not wait for it.
 const GROUP_BYTES_MAX: usize = 4 << 20;
+/// Size up to which a group is small, bytes.
+const SMALL_BYTES_MAX: usize = 64 << 10;
 /// Approximate size of a record without its lists, bytes.
 const RECORD_BYTES: usize = 1 << 10;
 
@@ -40,6 +42,11 @@ impl Group {
 
     pub(crate) fn is_full(&self) -> bool {
         self.records.len() >= GROUP_RECORDS_MAX || self.bytes >= GROUP_BYTES_MAX
+    }
+
+    /// Returns whether nobody has waited long for it.
+    pub(crate) fn is_small(&self) -> bool {
+        self.bytes <= SMALL_BYTES_MAX
     }
 
     /// Makes the records durable, and reports each of them.

@@ -29,6 +29,7 @@ mod backup;
 mod columns;
 mod group;
 mod job_row;
+mod log;
 mod opening;
 mod parts;
 mod schema;
@@ -36,16 +37,14 @@ mod store_trait;
 mod summary;
 
 pub use acknowledged::LostJobs;
-use acknowledged::Mark;
+use acknowledged::{LAST_DELETED_JOB, Mark, last_known, never_again};
 use columns::{
     JobColumns, ban_checksum, end_checksum, evaluation, evaluation_checksum, job_checksum,
     nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
 };
 use job_row::{damaged_end, job_columns, job_record};
-
-/// The header field of the file that holds the highest identifier of a deleted job. It is part of
-/// the database, so it changes in one transaction with the tables.
-const LAST_DELETED_JOB: &str = "user_version";
+use log::Log;
+use parts::StaleParts;
 
 /// A store in a SQLite file.
 #[derive(Debug)]
@@ -59,6 +58,8 @@ pub struct SqliteStore {
     /// While a group is put: the highest job in it, which the mark names once the group is durable;
     /// 0 if there is none.
     group: Cell<Option<JobId>>,
+    log: Log,
+    stale: RefCell<StaleParts>,
 }
 
 impl Drop for SqliteStore {
@@ -90,14 +91,23 @@ impl SqliteStore {
             let last = acknowledged::checked(&found, known, path, lost)?;
             Ok((found, known, last))
         };
-        let (connection, lock, path, (found, known, last)) =
+        let (mut connection, lock, path, (found, known, last)) =
             opening::open(directory, acknowledged)?;
         backup::remove_leftover(&path)?;
         if last > known {
             never_again(&connection, last).map_err(|source| opening::refusal(&path, source))?;
         }
         let mark = RefCell::new(Mark::open(directory, &found, last)?);
-        Ok(Self { connection, path, lock, mark, group: Cell::new(None) })
+        let log = Log::of(&mut connection).map_err(|source| opening::refusal(&path, source))?;
+        Ok(Self {
+            connection,
+            path,
+            lock,
+            mark,
+            group: Cell::new(None),
+            log,
+            stale: RefCell::default(),
+        })
     }
 
     /// Creates a directory for a store, if there is none; other users cannot access it.
@@ -331,7 +341,7 @@ impl Store for &SqliteStore {
         let values = params![job.0, number, &point, outcomes, checksum, errors, workers];
         self.change(|connection| {
             connection.execute(sql, values)?;
-            parts::delete_at(connection, job, &point)?;
+            self.stale.borrow_mut().add_at(connection, job, &point)?;
             if is_last {
                 let sql = "DELETE FROM evaluation WHERE job = ?1 AND number > ?2";
                 connection.execute(sql, params![job.0, number])?;
@@ -379,7 +389,7 @@ impl Store for &SqliteStore {
         self.change(|connection| {
             connection.execute(sql, values)?;
             summary::put(connection, record.job, summary)?;
-            parts::delete_of(connection, record.job)
+            self.stale.borrow_mut().add_of(connection, record.job)
         })
     }
 
@@ -463,30 +473,24 @@ impl Store for &SqliteStore {
         deleted.map(drop).map_err(|source| self.refused(source))
     }
 
+    fn settle(&mut self) -> bool {
+        let deleted = self.stale.borrow_mut().delete_some(&self.connection);
+        let left = match deleted {
+            Ok(true) => Ok(true),
+            Ok(false) => self.log.copy(&self.connection).map(|()| false),
+            Err(error) => Err(error),
+        };
+        left.unwrap_or_else(|error| {
+            tracing::warn!(%error, "the store is not tidied up yet; it is tried again");
+            false
+        })
+    }
+
     fn copy(&mut self, between: &mut BetweenPieces<'_>) -> Result<Option<File>, StoreError> {
         let mut store = *self;
         let mut lend = || between(&mut store as &mut dyn Store);
         backup::copy(&self.connection, &self.path, &mut lend)
     }
-}
-
-/// Returns the highest identifier in the database, including those of deleted jobs; 0 if there is
-/// none.
-fn last_known(connection: &Connection) -> rusqlite::Result<u64> {
-    let stored: Option<u64> = if connection.table_exists(None, "job")? {
-        connection.query_row("SELECT max(id) FROM job", [], |row| row.get(0))?
-    } else {
-        None
-    };
-    let deleted: i32 = connection.pragma_query_value(None, LAST_DELETED_JOB, |row| row.get(0))?;
-    Ok(stored.unwrap_or(0).max(u64::try_from(deleted).unwrap_or(0)))
-}
-
-/// Makes durable that no job gets an identifier up to `last`.
-fn never_again(connection: &Connection, last: u64) -> rusqlite::Result<()> {
-    let last = i32::try_from(last).unwrap_or(i32::MAX);
-    connection.pragma_update(None, LAST_DELETED_JOB, last)?;
-    connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use std::os::unix::fs::{FileExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
 use osteon_files::user_file;
+use rusqlite::Connection;
 
 use super::opening::FILE_MODE;
 use crate::core::ids::JobId;
@@ -27,6 +28,10 @@ pub(super) const MARK: &str = "osteon.acknowledged";
 const SLOT_BYTES: usize = 4096;
 const SLOTS: u64 = 2;
 const LENGTH: u64 = SLOTS * SLOT_BYTES as u64;
+
+/// The header field of the file that holds the highest identifier of a deleted job. It is part of
+/// the database, so it changes in one transaction with the tables.
+pub(super) const LAST_DELETED_JOB: &str = "user_version";
 
 /// Reaction to a database that has fewer jobs than were acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -196,6 +201,25 @@ fn found(bytes: &[u8]) -> MarkFile {
         Some((last, slot)) if bytes.len() as u64 == LENGTH => MarkFile::Job { last, slot },
         _ => MarkFile::Damaged,
     }
+}
+
+/// Returns the highest identifier in the database, including those of deleted jobs; 0 if there is
+/// none.
+pub(super) fn last_known(connection: &Connection) -> rusqlite::Result<u64> {
+    let stored: Option<u64> = if connection.table_exists(None, "job")? {
+        connection.query_row("SELECT max(id) FROM job", [], |row| row.get(0))?
+    } else {
+        None
+    };
+    let deleted: i32 = connection.pragma_query_value(None, LAST_DELETED_JOB, |row| row.get(0))?;
+    Ok(stored.unwrap_or(0).max(u64::try_from(deleted).unwrap_or(0)))
+}
+
+/// Makes durable that no job gets an identifier up to `last`.
+pub(super) fn never_again(connection: &Connection, last: u64) -> rusqlite::Result<()> {
+    let last = i32::try_from(last).unwrap_or(i32::MAX);
+    connection.pragma_update(None, LAST_DELETED_JOB, last)?;
+    connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
 }
 
 #[cfg(test)]

@@ -18,6 +18,10 @@ impl Store for SqliteStore {
         (&*self).together(changes)
     }
 
+    fn settle(&mut self) -> bool {
+        (&*self).settle()
+    }
+
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         (&*self).visit_jobs(visit)
     }

@@ -339,14 +339,23 @@ fn a_database_of_another_program_is_left_as_it_is() {
 /// Opens a file that was created with a write-ahead log as on a network file system.
 fn with_rollback_journal(directory: &Path) -> SqliteStore {
     let path = directory.join(FILE);
-    let (connection, ()) = open_file(&path, Journal::Rollback, |_, _| Ok(())).unwrap();
+    let (mut connection, ()) = open_file(&path, Journal::Rollback, |_, _| Ok(())).unwrap();
     let mode: String = connection.pragma_query_value(None, "journal_mode", |r| r.get(0)).unwrap();
     assert_eq!(mode, "delete");
     let lock = tempfile::tempfile().unwrap();
     let found = Mark::find(directory).unwrap();
     let last = last_known(&connection).unwrap();
     let mark = Mark::open(directory, &found, last).unwrap().into();
-    SqliteStore { connection, path, lock, mark, group: Cell::new(None) }
+    let log = Log::of(&mut connection).unwrap();
+    SqliteStore {
+        connection,
+        path,
+        lock,
+        mark,
+        group: Cell::new(None),
+        log,
+        stale: RefCell::default(),
+    }
 }
 
 #[test]
