@@ -67,7 +67,7 @@ pub(crate) enum Command {
     ///
     /// The maximum number of evaluations shown includes the evaluations for the derivatives at the
     /// best point, one for each free parameter.
-    Watch(JobArguments),
+    Watch(WatchArguments),
     /// Explain why a job is not faster, and what would make it faster
     Explain(ExplainArguments),
     /// Cancel a job
@@ -115,6 +115,28 @@ pub(crate) struct RunArguments {
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
+    /// Format of the progress on stderr. text: for people; json: for programs, one object per line
+    /// with the keys of `osteon jobs --json`, below the key `progress`. With json the run ends when
+    /// stderr is closed
+    #[arg(
+        long,
+        value_enum,
+        value_name = "FORMAT",
+        default_value = "text",
+        hide_possible_values = true
+    )]
+    pub(crate) progress: ProgressFormat,
+}
+
+/// Format of a run's progress on stderr.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ProgressFormat {
+    /// A few lines on a terminal, otherwise one line a minute.
+    #[value(help = None)]
+    Text,
+    /// One JSON object per line whenever the job changes.
+    #[value(help = None)]
+    Json,
 }
 
 /// Arguments of `simulate`.
@@ -260,6 +282,17 @@ pub(crate) struct JobArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
+}
+
+/// Arguments of `watch`.
+#[derive(Debug, Args)]
+pub(crate) struct WatchArguments {
+    /// The job and its coordinator.
+    #[command(flatten)]
+    pub(crate) job: JobArguments,
+    /// Print one JSON object per line
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Arguments of `explain`.

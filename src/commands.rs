@@ -61,9 +61,9 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
         Resolved::Jobs { coordinator, format } => {
             unless_interrupted(jobs::list(&coordinator, format), NOTHING_LEFT).await
         }
-        Resolved::Watch { job, coordinator } => {
+        Resolved::Watch { job, coordinator, format } => {
             let left = "the job continues (see `osteon jobs`, `osteon cancel`)";
-            unless_interrupted(jobs::watch(&job, &coordinator), left).await
+            unless_interrupted(jobs::watch(&job, &coordinator, format), left).await
         }
         Resolved::Explain { job, coordinator, format } => {
             unless_interrupted(jobs::explain(&job, &coordinator, format), NOTHING_LEFT).await

@@ -3,7 +3,7 @@
 mod display;
 mod observer;
 
-use std::io::{IsTerminal as _, Write};
+use std::io::{self, IsTerminal as _, Write};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
@@ -11,8 +11,12 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::visible;
 use osteon_proto::v1::JobSnapshot;
+use serde_json::json;
 use terminal_size::{Width, terminal_size_of};
 use tracing_subscriber::fmt::MakeWriter;
+
+use crate::arguments::ProgressFormat;
+use crate::output::json::snapshot_value;
 
 pub(crate) use self::display::{JobProgress, line, span};
 use self::observer::Observer;
@@ -32,6 +36,7 @@ static BARS: OnceLock<MultiProgress> = OnceLock::new();
 /// Progress of one run.
 #[derive(Debug)]
 pub(crate) struct Progress {
+    format: ProgressFormat,
     bar: Option<ProgressBar>,
     begun: Instant,
     last_line: Instant,
@@ -40,8 +45,9 @@ pub(crate) struct Progress {
 
 impl Progress {
     /// Starts to show the progress of this job.
-    pub(crate) fn start(specification: &JobSpecification) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+    pub(crate) fn start(specification: &JobSpecification, format: ProgressFormat) -> Self {
+        let has_bar = format == ProgressFormat::Text && io::stderr().is_terminal();
+        let bar = has_bar.then(|| {
             let bars = BARS.get_or_init(|| {
                 MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(DRAWN_HZ))
             });
@@ -54,11 +60,17 @@ impl Progress {
         });
         let begun = Instant::now();
         let observer = Observer::new(derivatives(specification));
-        Self { bar, begun, last_line: begun, observer }
+        Self { format, bar, begun, last_line: begun, observer }
     }
 
     /// Shows the progress of the job.
-    pub(crate) fn show(&mut self, snapshot: &JobSnapshot) {
+    ///
+    /// # Errors
+    /// If a program was to read the progress, and has closed stderr.
+    pub(crate) fn show(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
+        if self.format == ProgressFormat::Json {
+            return writeln!(io::stderr(), "{}", json!({ "progress": snapshot_value(snapshot) }));
+        }
         let observed = self.observer.observe(snapshot, self.begun.elapsed());
         if let Some(bar) = &self.bar {
             bar.set_message(display::lines(snapshot, &observed, terminal_width()).join("\n"));
@@ -66,6 +78,7 @@ impl Progress {
             self.last_line = Instant::now();
             say(&line(snapshot, &observed, usize::MAX));
         }
+        Ok(())
     }
 
     /// Removes the bar.
@@ -100,7 +113,7 @@ fn derivatives(specification: &JobSpecification) -> u64 {
 
 /// Returns the current number of columns of the terminal.
 fn terminal_width() -> usize {
-    let width = terminal_size_of(std::io::stderr()).map(|(Width(width), _)| usize::from(width));
+    let width = terminal_size_of(io::stderr()).map(|(Width(width), _)| usize::from(width));
     width.filter(|width| *width > 0).unwrap_or(WIDTH_DEFAULT).max(WIDTH_MIN)
 }
 
@@ -108,7 +121,7 @@ fn terminal_width() -> usize {
 pub(crate) fn say(line: &str) {
     let line = visible::lines(line);
     // If stderr is closed, nothing more can be done.
-    let write = || drop(writeln!(std::io::stderr(), "{line}"));
+    let write = || drop(writeln!(io::stderr(), "{line}"));
     match BARS.get() {
         Some(bars) => bars.suspend(write),
         None => write(),
@@ -128,10 +141,10 @@ impl<'a> MakeWriter<'a> for LogWriter {
 }
 
 impl Write for LogWriter {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let text = shown(bytes);
         // A closed stderr must not end a computation.
-        let write = || drop(std::io::stderr().write_all(text.as_bytes()));
+        let write = || drop(io::stderr().write_all(text.as_bytes()));
         match BARS.get() {
             Some(bars) => bars.suspend(write),
             None => write(),
@@ -139,7 +152,7 @@ impl Write for LogWriter {
         Ok(bytes.len())
     }
 
-    fn flush(&mut self) -> std::io::Result<()> {
+    fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
 }

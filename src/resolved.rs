@@ -14,8 +14,8 @@ use osteon_worker::WorkerConfig;
 use crate::arguments::{
     Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
     CredentialArguments, DrawArguments, JobsArguments, JobsCommand, LogFormat, ObserveArguments,
-    RunArguments, SchemaArguments, SimulateArguments, SubmitArguments, TokenArguments,
-    WorkerArguments, WorkersArguments, WorkersCommand,
+    ProgressFormat, RunArguments, SchemaArguments, SimulateArguments, SubmitArguments,
+    TokenArguments, WatchArguments, WorkerArguments, WorkersArguments, WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
@@ -172,6 +172,8 @@ pub(crate) enum Resolved {
         job: String,
         /// The coordinator to ask.
         coordinator: Remote,
+        /// Output format.
+        format: OutputFormat,
     },
     /// `explain`.
     Explain {
@@ -215,6 +217,8 @@ pub(crate) struct Run {
     pub(crate) out: Option<PathBuf>,
     /// Output format.
     pub(crate) format: OutputFormat,
+    /// Format of the progress.
+    pub(crate) progress: ProgressFormat,
 }
 
 /// Where a job is computed.
@@ -289,8 +293,9 @@ impl Resolved {
                 coordinator: remote(arguments.client)?,
                 format: format(arguments.json),
             },
-            Command::Watch(arguments) => {
-                Self::Watch { job: arguments.job, coordinator: remote(arguments.client)? }
+            Command::Watch(WatchArguments { job, json }) => {
+                let coordinator = remote(job.client)?;
+                Self::Watch { job: job.job, coordinator, format: format(json) }
             }
             Command::Explain(arguments) => Self::Explain {
                 job: arguments.job,
@@ -337,7 +342,7 @@ fn resolve_run(
     cores: u32,
     environment: &Environment,
 ) -> Result<Run, CommandFailure> {
-    let RunArguments { job, workers, threads, coordinator, credentials, name, out, json } =
+    let RunArguments { job, workers, threads, coordinator, credentials, name, out, json, progress } =
         arguments;
     let files = CredentialFiles::from(credentials);
     let local = workers.is_some() || threads.is_some();
@@ -361,7 +366,15 @@ fn resolve_run(
             RunLocation::Local { workers, threads: threads.unwrap_or((cores / workers).max(1)) }
         }
     };
-    Ok(Run { kind, job, location, name: name.unwrap_or_default(), out, format: format(json) })
+    Ok(Run {
+        kind,
+        job,
+        location,
+        name: name.unwrap_or_default(),
+        out,
+        format: format(json),
+        progress,
+    })
 }
 
 /// Resolves `jobs` and its subcommands.

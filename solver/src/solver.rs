@@ -157,7 +157,8 @@ impl Solver {
         &self.setup
     }
 
-    pub(crate) fn isa(&self) -> Isa {
+    /// Returns the instruction set on which it computes.
+    pub fn isa(&self) -> Isa {
         self.isa
     }
 

@@ -76,10 +76,14 @@ pub(super) async fn prune(
 }
 
 /// `watch`: prints a line when the job changes, at most one a second, until it has ended.
-pub(super) async fn watch(job: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
+pub(super) async fn watch(
+    job: &str,
+    coordinator: &Remote,
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
     coordinator.announce();
     let mut client = Client::connect(coordinator).await?;
-    let mut output = output::stdout(OutputFormat::Text);
+    let mut output = output::stdout(format);
     let mut last_line: Option<Instant> = None;
     let show = |snapshot: &JobSnapshot| {
         let due = last_line.is_none_or(|last| last.elapsed() >= LINE_INTERVAL);

@@ -13,6 +13,7 @@ use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::v1::JobSnapshot;
 use osteon_solver::Isa;
 
+use crate::arguments::ProgressFormat;
 use crate::client::{Client, Fetched, Remote, SubmitOptions};
 use crate::embedded::{Embedded, StoreLocation};
 use crate::environment::Unused;
@@ -59,13 +60,12 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
     if let Some(result) = finished(&run, specification)? {
         return show(&run, specification, &result);
     }
+    let job = NamedJob { specification, name: &run.name, progress: run.progress };
     let fetched = match location {
         ConnectedLocation::Local { workers, threads } => {
-            let job = NamedJob { specification, name: &run.name };
             run_locally(workers, threads, job, directory.as_ref(), interruption).await?
         }
         ConnectedLocation::Coordinator(client) => {
-            let job = NamedJob { specification, name: &run.name };
             run_on_coordinator(*client, job, directory.as_ref(), interruption).await?
         }
     };
@@ -73,11 +73,12 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
     show(&run, specification, &result)
 }
 
-/// A job and its name for display.
+/// A job, its name for display, and the format of its progress.
 #[derive(Clone, Copy)]
 struct NamedJob<'a> {
     specification: &'a JobSpecification,
     name: &'a str,
+    progress: ProgressFormat,
 }
 
 /// Where a job is computed; a coordinator is already connected.
@@ -208,7 +209,7 @@ async fn run_on_coordinator(
 /// Submits the job, follows it and fetches its results.
 async fn drive(
     mut client: Client,
-    NamedJob { specification, name }: NamedJob<'_>,
+    NamedJob { specification, name, progress }: NamedJob<'_>,
     directory: Option<&ResultsDirectory>,
     note: impl Fn(&JobSnapshot),
 ) -> Result<Fetched, CommandFailure> {
@@ -221,12 +222,15 @@ async fn drive(
     if let Some(directory) = directory {
         directory.write_job(specification)?;
     }
-    let mut progress = Progress::start(specification);
+    let mut progress = Progress::start(specification, progress);
     client
         .watch(&job, |snapshot| {
             note(snapshot);
-            progress.show(snapshot);
-            Ok::<(), CommandFailure>(())
+            // Whoever started this run has ended, and its result would be lost.
+            progress.show(snapshot).map_err(|_| {
+                let left = "the program that reads the progress has closed stderr";
+                CommandFailure::Interrupted(Interruption::Terminated, left)
+            })
         })
         .await?;
     progress.finish();

@@ -103,7 +103,9 @@ impl Output for JsonOutput<'_> {
     }
 
     fn snapshot(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
-        self.value(&snapshot_value(snapshot))
+        // On one line, because `watch` prints many of them.
+        writeln!(self.writer, "{}", snapshot_value(snapshot))?;
+        self.writer.flush()
     }
 
     fn verbatim(&mut self, text: &str) -> io::Result<()> {
@@ -235,7 +237,8 @@ fn explanation_value(explained: &ExplainResponse) -> Value {
     })
 }
 
-fn snapshot_value(snapshot: &JobSnapshot) -> Value {
+/// Returns the state of a job.
+pub(crate) fn snapshot_value(snapshot: &JobSnapshot) -> Value {
     let text = |text: &str| (!text.is_empty()).then(|| text.to_owned());
     let submitted = snapshot.submit_time.as_ref().and_then(timestamp::from_message);
     let ended = snapshot.end_time.as_ref().and_then(timestamp::from_message);

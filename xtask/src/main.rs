@@ -81,7 +81,7 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "python",
-        "tests the gRPC API by a client in Python; takes names of tests",
+        "builds and tests the Python package, tests the gRPC API by a client; takes names of tests",
         Action::Function(python::test),
     ),
     (
@@ -106,7 +106,7 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "ci",
-        "what CI runs: lint, deny, every test, tracing, metrics, the client in Python, deploy, Slurm if installed",
+            "what CI runs: lint, deny, every test, tracing, metrics, Python, deploy, Slurm if installed",
         Action::Commands(&[
             &["lint"],
             &["deny"],
@@ -130,7 +130,7 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "reference",
-        "writes what docs/ takes from the program: tables of keys, JSON Schemas",
+        "writes what docs/ and python/ take from the program: tables of keys, schemas, types",
         Action::Function(reference::write),
     ),
     (
