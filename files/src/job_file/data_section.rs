@@ -38,7 +38,11 @@ pub(super) const KEYS: [Key; 12] = [
     },
     Key {
         name: "decay",
-        meaning: "name of the CSV column that holds the decay along the array (dB/cm, -100 to 100, with a                   mean above 0) measured with each velocity, in every row: the mean decay is matched                   beside the moments of the velocities, see [below](#decays); requires the objective                   `\"chi_square\"`, the search `\"simplex\"`, no `[posterior]`, and at least ten                   velocities, or subjects, in each group",
+        meaning: "name of the CSV column that holds the decay along the array (dB/cm, -100 to 100, with a \
+                  mean above 0) measured with each velocity, in every row: the mean decay is matched \
+                  beside the moments of the velocities, see [below](#decays); requires the objective \
+                  `\"chi_square\"`, the search `\"simplex\"`, no `[posterior]`, and at least ten \
+                  velocities, or subjects, in each group",
     },
     Key {
         name: "known",
