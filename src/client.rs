@@ -3,7 +3,7 @@
 pub(crate) mod operators;
 
 use std::panic::resume_unwind;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use osteon_common::job::JobSpecification;
 use osteon_common::results::{Evaluation, JobResult, Status as JobStatus};
@@ -12,6 +12,7 @@ use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
 use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::malformed::Malformed;
+use osteon_proto::spans::{AttributeValue, OpenSpan, TRACEPARENT, TraceContext};
 use osteon_proto::specification;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{self, JobSnapshot};
@@ -23,6 +24,7 @@ use tonic::Code;
 use crate::environment::{COORDINATOR, Unused};
 use crate::progress::say;
 use crate::request_id::RequestId;
+use crate::telemetry;
 
 use self::parts::FetchedParts;
 use self::peer::{Peer, with_wait_notice};
@@ -30,6 +32,8 @@ use self::peer::{Peer, with_wait_notice};
 mod parts;
 mod peer;
 
+/// Name of the span of a submission.
+const SUBMIT: &str = "osteon.submit";
 /// Longest wait for a coordinator, s.
 const ANSWER_S_MAX: u64 = 10;
 /// Time without a coordinator after which the user is told that the client is waiting for it, s.
@@ -243,6 +247,28 @@ impl Client {
         request: &RequestId,
         options: SubmitOptions,
     ) -> Result<String, ClientError> {
+        let span = telemetry::recorder().and_then(|recorder| {
+            Some((recorder, OpenSpan::begin(SUBMIT, None, SystemTime::now())?))
+        });
+        let context = span.as_ref().map(|(_, span)| span.context());
+        let submitted = self.submit_within(context, specification, request, options).await;
+        if let Some((recorder, mut span)) = span {
+            if let Ok(job) = &submitted {
+                span.set("job", AttributeValue::Text(job.clone()));
+            }
+            let error = submitted.as_ref().err().map(ToString::to_string);
+            recorder.record(span.end(SystemTime::now(), error));
+        }
+        submitted
+    }
+
+    async fn submit_within(
+        &mut self,
+        span: Option<TraceContext>,
+        specification: &JobSpecification,
+        request: &RequestId,
+        options: SubmitOptions,
+    ) -> Result<String, ClientError> {
         let message = v1::SubmitRequest {
             specification: Some(specification::to_message(specification)),
             request_id: request.id.clone(),
@@ -253,7 +279,12 @@ impl Client {
         let (begun, mut uncertain) = (Instant::now(), false);
         loop {
             let left = answer_limit().saturating_sub(begun.elapsed());
-            let call = self.jobs.submit(message.clone());
+            let mut call = tonic::Request::new(message.clone());
+            let context = span.and_then(|span| span.to_string().parse().ok());
+            if let Some(context) = context {
+                call.metadata_mut().insert(TRACEPARENT, context);
+            }
+            let call = self.jobs.submit(call);
             let error = match self.peer.answered_within(left, call).await {
                 Ok(response) => return Ok(response.job),
                 Err(error) => error,

@@ -18,6 +18,7 @@ use tempfile::TempDir;
 use crate::embedded::workers::Workers;
 use crate::exit_status::CommandFailure;
 use crate::program;
+use crate::telemetry;
 
 /// Longest path of a temporary directory that leaves room for the socket's name, bytes.
 const TEMPORARY_BYTES_MAX: usize = 70;
@@ -76,7 +77,10 @@ impl Embedded {
     }
 
     /// Ends and reaps the workers, then ends the coordinator.
-    pub(crate) async fn end(self) {
+    pub(crate) async fn end(mut self) {
+        // The coordinator first: it would report workers that are ended with batches as lost.
+        self.workers.mute();
+        self.coordinator.drain().await;
         self.workers.end().await;
         self.coordinator.shutdown().await;
     }
@@ -87,7 +91,7 @@ async fn start_coordinator(
     socket: PathBuf,
 ) -> Result<Coordinator, CommandFailure> {
     let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
-    let listener = listener.map_err(CommandFailure::failed)?;
+    let listener = listener.map_err(CommandFailure::failed)?.with_spans(telemetry::recorder());
     let store: Box<dyn Store + Send> = match store {
         StoreLocation::Memory => Box::new(MemoryStore::new()),
         // Lost jobs are accepted here: this process submits its job again, and it is recomputed.

@@ -32,6 +32,7 @@ mod sample_result;
 mod signals;
 mod simulation_directory;
 mod slurm;
+mod telemetry;
 mod unsearched_groups;
 mod warnings;
 
@@ -42,6 +43,7 @@ use clap::Parser as _;
 use crate::arguments::{Arguments, LogFormat};
 use crate::exit_status::{CommandFailure, ExitStatus};
 use crate::resolved::Resolved;
+use crate::telemetry::Telemetry;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
@@ -68,7 +70,10 @@ fn run(arguments: Arguments, log_format: &mut LogFormat) -> Result<ExitStatus, C
         .map_err(|error| {
             CommandFailure::failed(anyhow::Error::new(error).context("cannot start"))
         })?;
+    // Its client needs the runtime, and outlives the command.
+    let telemetry = runtime.block_on(async { Telemetry::start(&resolved) })?;
     let result = runtime.block_on(commands::run(resolved));
+    telemetry.end();
     // An abandoned computation may still occupy a thread; its result is not needed.
     runtime.shutdown_background();
     result

@@ -410,6 +410,7 @@ fn resolve_worker(
     let endpoint = environment.needed(arguments.coordinator)?;
     let (files, unused) = environment.files(arguments.credentials.into(), &endpoint);
     let config = WorkerConfig {
+        spans: None,
         endpoint,
         credentials: Credentials::default(),
         threads: arguments.threads.unwrap_or(cores),

@@ -169,7 +169,7 @@ impl LongRun {
         let job = scratch.write("long.toml", &long_job());
         let mut command = osteon();
         command.args(["identify", text(&job), "--json", "--out", text(out)]);
-        let process = Owned::spawn(&mut command);
+        let process = Owned::spawn_logging(&mut command, &scratch.path("run.log"));
         let (mut workers, mut url) = (Vec::new(), None);
         eventually("two workers run", || {
             workers = children(process.id());
@@ -231,6 +231,9 @@ fn an_interrupted_run_ends_its_workers_and_can_be_continued() {
     assert_eq!(process.code(), Some(143));
     // Their parent reaped them before it ended.
     assert!(workers.iter().all(|&worker| !is_alive(worker)), "{workers:?}");
+    // They held batches, but this process ended them itself: they are not lost.
+    let log = fs::read_to_string(scratch.path("run.log")).unwrap();
+    assert!(warnings(&log).is_empty(), "{log}");
     continues(&scratch, &out, stored);
 }
 

@@ -6,6 +6,7 @@ pub(crate) mod backing_up;
 pub(crate) mod core_task;
 pub(crate) mod failing;
 pub(crate) mod fetching;
+pub(crate) mod job_spans;
 pub(crate) mod jobs;
 pub mod listen;
 pub(crate) mod meter;

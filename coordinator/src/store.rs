@@ -173,8 +173,11 @@ pub trait Store {
     /// each of them again to learn which.
     fn together(&mut self, changes: &mut Changes<'_>) -> Result<(), StoreError>;
 
-    /// Does what no record has to wait for. Whatever is durable is so before.
-    fn settle(&mut self) {}
+    /// Does some of the work that no record has to wait for: what is durable is so already. Returns
+    /// whether there is more.
+    fn settle(&mut self) -> bool {
+        false
+    }
 
     /// Returns all jobs, in the order of their identifiers.
     ///

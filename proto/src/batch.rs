@@ -24,7 +24,8 @@ pub struct Work {
 
 /// Returns the message of batch number `batch`.
 pub fn to_message(batch: u64, work: &Work) -> v1::Batch {
-    v1::Batch { batch, evaluation: work.evaluation.id, first: work.first, count: work.count }
+    let Work { evaluation, first, count } = work;
+    v1::Batch { batch, evaluation: evaluation.id, first: *first, count: *count, trace: None }
 }
 
 /// Returns the work of a batch, of an evaluation that was received before.
@@ -202,7 +203,8 @@ mod tests {
         let mut received = Received::default();
         received.receive(&evaluation(7)).unwrap();
         let refused = |change: fn(&mut v1::Batch)| {
-            let mut message = v1::Batch { batch: 1, evaluation: 7, first: 0, count: 10 };
+            let mut message =
+                v1::Batch { batch: 1, evaluation: 7, first: 0, count: 10, trace: None };
             from_message(&message, &received).unwrap();
             change(&mut message);
             from_message(&message, &received).unwrap_err()

@@ -24,6 +24,7 @@ mod posterior_settings;
 pub mod realizations;
 pub mod results;
 pub mod setup;
+pub mod spans;
 pub mod specification;
 pub mod status;
 pub mod timestamp;

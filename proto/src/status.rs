@@ -37,6 +37,12 @@ pub fn resource_exhausted(message: impl Into<String>, retry: Duration) -> Status
     Status::with_error_details(Code::ResourceExhausted, message, details)
 }
 
+/// Returns `UNAVAILABLE` with a `google.rpc.RetryInfo`: another process may answer after `retry`.
+pub fn unavailable(message: impl Into<String>, retry: Duration) -> Status {
+    let details = ErrorDetails::with_retry_info(Some(retry));
+    Status::with_error_details(Code::Unavailable, message, details)
+}
+
 /// Returns the time to wait before a refused request is tried again, if its status carries one.
 pub fn retry_after(status: &Status) -> Option<Duration> {
     status.get_details_retry_info()?.retry_delay
@@ -129,6 +135,9 @@ mod tests {
         assert_eq!((status.code(), status.message()), (Code::ResourceExhausted, "too many jobs"));
         assert_eq!(retry_after(&status), Some(Duration::from_secs(5)));
         assert_eq!(retry_after(&Status::resource_exhausted("for ever")), None);
+        let status = unavailable("it stops", Duration::from_millis(1500));
+        assert_eq!((status.code(), status.message()), (Code::Unavailable, "it stops"));
+        assert_eq!(retry_after(&status), Some(Duration::from_millis(1500)));
     }
 
     #[test]

@@ -18,6 +18,7 @@ use crate::program;
 use crate::resolved::OutputFormat;
 use crate::result_files;
 use crate::signals;
+use crate::telemetry;
 
 /// Heartbeats within the duration of a lease; several, because some may come late.
 const HEARTBEATS_PER_LEASE: u32 = 5;
@@ -50,6 +51,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
             listener.with_metrics(metrics)
         }
     };
+    let listener = listener.with_spans(telemetry::recorder());
     let lost = if arguments.accept_lost_jobs { LostJobs::Accept } else { LostJobs::Refuse };
     let store = SqliteStore::open_with(&directory, lost).map_err(CommandFailure::failed)?;
     let config = Config {

@@ -8,6 +8,7 @@ use tonic::Code;
 use crate::environment::Unused;
 use crate::exit_status::{CommandFailure, ExitStatus};
 use crate::signals;
+use crate::telemetry;
 
 /// Serves until a signal, the time limit, or an error.
 pub(super) async fn serve(
@@ -19,7 +20,7 @@ pub(super) async fn serve(
         let of_trust = matches!(error, CredentialsError::NoAuthority { .. });
         CommandFailure::BadInput(noted(error.into(), of_trust, unused))
     })?;
-    let config = WorkerConfig { credentials, ..config };
+    let config = WorkerConfig { credentials, spans: telemetry::recorder(), ..config };
     let interruption = signals::interruption()?;
     let interruption = async {
         interruption.await;

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
@@ -39,6 +39,8 @@ pub(crate) struct Workers {
     tasks: JoinSet<()>,
     stop: watch::Sender<bool>,
     failures: mpsc::Receiver<anyhow::Error>,
+    /// Nothing is reported of the workers any more.
+    muted: Arc<AtomicBool>,
 }
 
 /// Data shared by the supervisors of all workers.
@@ -47,6 +49,7 @@ struct SupervisorState {
     endpoint: Endpoint,
     threads: u32,
     progress: Arc<AtomicU64>,
+    muted: Arc<AtomicBool>,
 }
 
 /// Deaths of one worker since the last progress.
@@ -75,14 +78,17 @@ impl Workers {
         progress: Arc<AtomicU64>,
     ) -> Self {
         let endpoint = endpoint.clone();
-        let shared = Arc::new(SupervisorState { executable, endpoint, threads, progress });
+        let muted = Arc::<AtomicBool>::default();
+        let shared =
+            SupervisorState { executable, endpoint, threads, progress, muted: Arc::clone(&muted) };
+        let shared = Arc::new(shared);
         let (stop, stopped) = watch::channel(false);
         let (failure_sender, failures) = mpsc::channel(1);
         let mut tasks = JoinSet::new();
         for number in 1..=count {
             tasks.spawn(keep(number, Arc::clone(&shared), stopped.clone(), failure_sender.clone()));
         }
-        Self { tasks, stop, failures }
+        Self { tasks, stop, failures, muted }
     }
 
     /// Completes when a worker has failed for good.
@@ -91,6 +97,11 @@ impl Workers {
             Some(error) => CommandFailure::Failed(error),
             None => CommandFailure::failed(anyhow!("all workers have ended")),
         }
+    }
+
+    /// Reports nothing of the workers from now on: that they lose their coordinator is intended.
+    pub(crate) fn mute(&self) {
+        self.muted.store(true, Ordering::Relaxed);
     }
 
     /// Ends and reaps all processes.
@@ -112,7 +123,8 @@ async fn keep(
     loop {
         let (death, words) = match spawn(&shared.executable, &shared.endpoint, shared.threads) {
             Ok(mut child) => {
-                let words = tokio::spawn(listen(number, child.stderr.take()));
+                let words =
+                    tokio::spawn(listen(number, child.stderr.take(), Arc::clone(&shared.muted)));
                 tokio::select! {
                     status = child.wait() => (describe_death(status), last_words(words).await),
                     _ = stopped.changed() => {
@@ -124,6 +136,9 @@ async fn keep(
             }
             Err(error) => (format!("cannot be started: {error:#}"), String::new()),
         };
+        if shared.muted.load(Ordering::Relaxed) {
+            return;
+        }
         let in_a_row = deaths.count(shared.progress.load(Ordering::Relaxed));
         if in_a_row >= DEATHS_IN_A_ROW_MAX {
             let error = anyhow!(
@@ -168,7 +183,11 @@ fn spawn(executable: &Path, endpoint: &Endpoint, threads: u32) -> anyhow::Result
 }
 
 /// Forwards a worker's stderr line by line; returns its last lines.
-async fn listen(number: u32, stderr: Option<impl AsyncRead + Unpin>) -> VecDeque<String> {
+async fn listen(
+    number: u32,
+    stderr: Option<impl AsyncRead + Unpin>,
+    muted: Arc<AtomicBool>,
+) -> VecDeque<String> {
     let mut lines = VecDeque::new();
     let Some(stderr) = stderr else { return lines };
     let mut reader = BufReader::new(stderr);
@@ -180,7 +199,9 @@ async fn listen(number: u32, stderr: Option<impl AsyncRead + Unpin>) -> VecDeque
             Ok(_) => {}
         }
         let line = String::from_utf8_lossy(&bytes).trim_end().to_owned();
-        say(&format!("worker {number}: {line}"));
+        if !muted.load(Ordering::Relaxed) {
+            say(&format!("worker {number}: {line}"));
+        }
         if lines.len() == LINES_KEPT_MAX {
             lines.pop_front();
         }
@@ -216,11 +237,11 @@ mod tests {
     #[tokio::test]
     async fn the_last_lines_are_kept() {
         let text: String = (0..100).map(|i| format!("line {i}\n")).collect();
-        let lines = listen(1, Some(text.as_bytes())).await;
+        let lines = listen(1, Some(text.as_bytes()), Arc::default()).await;
         assert_eq!(lines.len(), LINES_KEPT_MAX);
         assert_eq!(lines.back().map(String::as_str), Some("line 99"));
         let endless = vec![b'x'; 3 * 4096];
-        let lines = listen(1, Some(endless.as_slice())).await;
+        let lines = listen(1, Some(endless.as_slice()), Arc::default()).await;
         assert_eq!(lines.len(), 3);
     }
 

@@ -8,6 +8,8 @@ use osteon_proto::identity::random_number;
 const FIRST_MS: u64 = 100;
 /// Longest wait before jitter, ms.
 const LONGEST_MS: u64 = 5000;
+/// Longest wait that a coordinator may ask for, before jitter, ms.
+const STATED_MS_MAX: u64 = 300_000;
 
 /// Exponential backoff: each wait is twice the previous one, up to a limit, and shortened at random
 /// by up to half, so that the workers of a cluster do not reconnect all at once.
@@ -23,9 +25,21 @@ impl Backoff {
         self.next_with(random_number().unwrap_or_default())
     }
 
+    /// Returns the wait after a refusal by a coordinator that states when to come back: that time,
+    /// and at random up to half as much again, so that those who were refused together do not all
+    /// come back together.
+    pub(crate) fn stated(delay: Duration) -> Duration {
+        Self::stated_with(delay, random_number().unwrap_or_default())
+    }
+
     /// Resets to the shortest wait.
     pub(crate) fn reset(&mut self) {
         self.failures = 0;
+    }
+
+    fn stated_with(delay: Duration, random: u64) -> Duration {
+        let delay = delay.min(Duration::from_millis(STATED_MS_MAX));
+        delay + Duration::from_millis(random % (delay.as_millis() as u64 / 2 + 1))
     }
 
     fn next_with(&mut self, random: u64) -> Duration {
@@ -53,6 +67,22 @@ mod tests {
             let wait = backoff.next().as_millis();
             assert!((2500..=5000).contains(&wait), "{wait} ms");
         }
+    }
+
+    #[test]
+    fn a_stated_wait_is_kept_within_reason() {
+        for (stated_s, random, expected_ms) in [
+            (0, 7, 0),
+            (30, 0, 30_000),
+            (30, 15_000, 45_000),
+            (30, 15_001, 30_000),
+            (1_000_000, 150_000, 450_000),
+            (u64::MAX, 0, 300_000),
+        ] {
+            let wait = Backoff::stated_with(Duration::from_secs(stated_s), random);
+            assert_eq!(wait, Duration::from_millis(expected_ms), "{stated_s} s, {random}");
+        }
+        assert!(Backoff::stated(Duration::from_secs(1)) >= Duration::from_secs(1));
     }
 
     #[test]

@@ -12,6 +12,7 @@
 
 mod backend;
 mod backoff;
+mod batch_spans;
 mod compute;
 mod error;
 mod run;

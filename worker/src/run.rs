@@ -3,12 +3,15 @@
 
 use std::future::Future;
 use std::pin::{Pin, pin};
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
 
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX};
 use osteon_proto::credentials::Credentials;
-use osteon_proto::endpoint::{self, ConnectError, Endpoint};
+use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::identity;
+use osteon_proto::spans::SpanRecorder;
+use osteon_proto::status::retry_after;
 use osteon_proto::tls_failure::TlsFailure;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::{AttachRequest, AttachResponse};
@@ -21,6 +24,7 @@ use tracing::{info, trace, warn};
 
 use crate::backend::{Backend, Computed, Task};
 use crate::backoff::Backoff;
+use crate::batch_spans::BatchSpans;
 use crate::compute::Cores;
 use crate::error::WorkerError;
 use crate::state::{BATCHES_HELD_MAX, Detached, Effect, Event, Failure, Identity, State};
@@ -50,6 +54,8 @@ pub struct WorkerConfig {
     pub time_limit: Option<Duration>,
     /// Time without work, or without a coordinator, after which the worker ends; `None` to stay.
     pub idle_timeout: Option<Duration>,
+    /// Where the spans of batches go that the coordinator traces.
+    pub spans: Option<Arc<dyn SpanRecorder>>,
 }
 
 /// Serves a coordinator until `shutdown` completes, the time limit has passed, or there was no work
@@ -100,6 +106,7 @@ async fn run_on(
         ever_answered: false,
         endpoint: config.endpoint.clone(),
         credentials: config.credentials.clone(),
+        spans: config.spans.clone().map(BatchSpans::new),
     };
     let leave = async {
         match config.time_limit {
@@ -128,6 +135,8 @@ struct Worker {
     ever_answered: bool,
     endpoint: Endpoint,
     credentials: Credentials,
+    /// Present if spans are recorded.
+    spans: Option<BatchSpans>,
 }
 
 /// Outcome of an attachment.
@@ -136,6 +145,8 @@ enum End {
     Left,
     /// The connection was lost, for this reason: retry.
     Lost(String),
+    /// The coordinator closed the stream for this reason, and states when to retry.
+    Deferred(String, Duration),
 }
 
 impl Worker {
@@ -146,9 +157,10 @@ impl Worker {
     ) -> Result<(), WorkerError> {
         let mut backoff = Backoff::default();
         loop {
-            let last = match self.attachment(leave.as_mut(), &mut backoff).await? {
+            let (last, stated) = match self.attachment(leave.as_mut(), &mut backoff).await? {
                 End::Left => return Ok(()),
-                End::Lost(reason) => reason,
+                End::Lost(reason) => (reason, None),
+                End::Deferred(reason, delay) => (reason, Some(delay)),
             };
             if let Some(End::Left) = self.apply(Event::Lost, None)? {
                 return Ok(());
@@ -159,7 +171,8 @@ impl Worker {
                 let (endpoint, seconds) = (self.endpoint.clone(), away.as_secs_f64().round());
                 return Err(WorkerError::GaveUp { endpoint, seconds, last });
             }
-            let wait = backoff.next().min(left.unwrap_or(Duration::MAX));
+            let wait = stated.map_or_else(|| backoff.next(), Backoff::stated);
+            let wait = wait.min(left.unwrap_or(Duration::MAX));
             let wait_ms = wait.as_millis() as u64;
             warn!(endpoint = %self.endpoint, wait_ms, reason = last, "reconnecting");
             if timeout(wait, leave.as_mut()).await.is_ok() {
@@ -176,12 +189,13 @@ impl Worker {
     ) -> Result<End, WorkerError> {
         let (outbox, requests) = mpsc::channel(OUTBOX_MAX);
         let (endpoint, credentials) = (self.endpoint.clone(), self.credentials.clone());
-        let hello = self.state.attach();
-        let opened = tokio::select! {
+        let connected = tokio::select! {
             () = leave.as_mut() => return Ok(End::Left),
-            opened = open(&endpoint, &credentials, hello, &outbox, requests) => opened,
+            connected = connect(&endpoint, &credentials) => connected,
         };
-        let mut responses = match opened {
+        // From the hello on, the coordinator may send batches: whoever leaves must drain.
+        let hello = self.state.attach();
+        let mut responses = match open(connected, hello, &outbox, requests).await {
             Ok(responses) => {
                 self.ever_answered = true;
                 responses
@@ -257,6 +271,9 @@ impl Worker {
             self.backend.forget(*task);
         }
         trace!(?event, "event");
+        if let Some(spans) = &mut self.spans {
+            spans.before(&event, SystemTime::now());
+        }
         let mut end = None;
         for effect in self.state.react(self.started.elapsed(), event) {
             match effect {
@@ -267,6 +284,9 @@ impl Worker {
                     }
                 }
                 Effect::Compute(task, work) => {
+                    if let Some(spans) = &mut self.spans {
+                        spans.begun(task, &work);
+                    }
                     let sender = self.finished_sender.clone();
                     let done = move |computed| {
                         // Fails only if the worker has ended; the result is then not needed.
@@ -274,7 +294,12 @@ impl Worker {
                     };
                     self.backend.start(task, work, Box::new(done));
                 }
-                Effect::Abandon(task) => self.backend.forget(task),
+                Effect::Abandon(task) => {
+                    if let Some(spans) = &mut self.spans {
+                        spans.abandoned(task);
+                    }
+                    self.backend.forget(task);
+                }
                 Effect::Detach(why) => end = Some(End::Lost(detached(why).to_owned())),
                 Effect::Leave => return Ok(Some(End::Left)),
                 Effect::Fail(failure) => return Err(self.failed(failure)),
@@ -300,7 +325,13 @@ impl Worker {
                 let (endpoint, code) = (self.endpoint.clone(), status.code());
                 Err(WorkerError::Refused { endpoint, code, reason })
             }
-            code => Ok(End::Lost(format!("{code}: {reason}"))),
+            code => {
+                let reason = format!("{code}: {reason}");
+                Ok(match retry_after(status) {
+                    Some(delay) => End::Deferred(reason, delay),
+                    None => End::Lost(reason),
+                })
+            }
         }
     }
 
@@ -331,24 +362,27 @@ enum OpenError {
     Status(Status),
 }
 
-/// Connects and sends the hello.
+async fn connect(endpoint: &Endpoint, credentials: &Credentials) -> Result<Connection, OpenError> {
+    let limit = Duration::from_secs(ATTACH_S_MAX);
+    let connected = endpoint::connect_with(endpoint, credentials, limit).await;
+    connected.map_err(|error| match error {
+        ConnectError::Tls { failure, .. } => OpenError::Distrust(failure),
+        other => OpenError::Unreachable(other.to_string()),
+    })
+}
+
+/// Sends the hello on a new connection, if there is one.
 async fn open(
-    endpoint: &Endpoint,
-    credentials: &Credentials,
+    connected: Result<Connection, OpenError>,
     hello: Request,
     outbox: &mpsc::Sender<AttachRequest>,
     requests: mpsc::Receiver<AttachRequest>,
 ) -> Result<Streaming<AttachResponse>, OpenError> {
     let limit = Duration::from_secs(ATTACH_S_MAX);
-    let connected = endpoint::connect_with(endpoint, credentials, limit).await;
-    let channel = connected.map_err(|error| match error {
-        ConnectError::Tls { failure, .. } => OpenError::Distrust(failure),
-        other => OpenError::Unreachable(other.to_string()),
-    })?;
     let unanswered = || OpenError::Unreachable("the coordinator does not answer".to_owned());
     // The outbox is empty, so the hello always fits.
     outbox.try_send(AttachRequest { message: Some(hello) }).map_err(|_| unanswered())?;
-    let mut client = endpoint::workers_client(channel);
+    let mut client = endpoint::workers_client(connected?);
     match timeout(limit, client.attach(ReceiverStream::new(requests))).await {
         Ok(Ok(response)) => Ok(response.into_inner()),
         Ok(Err(status)) => Err(OpenError::Status(status)),

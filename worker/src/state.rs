@@ -21,6 +21,9 @@ pub(crate) const BATCHES_HELD_MAX: usize = 1024;
 /// Longest time to finish the held batches while draining, s. After it, the worker leaves and the
 /// coordinator reassigns them.
 pub(crate) const DRAIN_S_MAX: f64 = 10.0;
+/// Longest time that a draining worker which holds nothing waits for the coordinator to close its
+/// stream, s.
+const DISMISSAL_S_MAX: f64 = 2.0;
 /// Limits of the intervals that a coordinator may set, s.
 const SPAN_S: (f64, f64) = (0.01, 3600.0);
 
@@ -168,7 +171,7 @@ impl State {
         self.number
     }
 
-    /// Returns whether the worker leaves once its held batches are answered.
+    /// Returns whether the worker leaves once all its batches are answered.
     pub(crate) fn is_draining(&self) -> bool {
         self.draining_since.is_some()
     }
@@ -181,6 +184,7 @@ impl State {
 
     /// Returns the effects of `event`, which happens at `now`.
     pub(crate) fn react(&mut self, now: Duration, event: Event) -> Vec<Effect> {
+        let held_before = !self.held.is_empty();
         let mut effects = match event {
             Event::Message(message) => self.on_message(now, *message),
             Event::Computed(task, computed) => self.on_computed(task, computed),
@@ -196,7 +200,7 @@ impl State {
         if effects.iter().any(|effect| matches!(effect, Effect::Detach(_))) {
             effects.extend(self.on_lost());
         }
-        if !self.held.is_empty() {
+        if held_before || !self.held.is_empty() {
             self.idle_since = now;
         }
         self.sanity_check();
@@ -217,7 +221,6 @@ impl State {
                 if held {
                     effects.push(Effect::Abandon(self.task(revoke.batch)));
                 }
-                effects.extend(self.leave_if_idle());
                 effects
             }
             (Link::Attached { .. }, Response::Drain(_)) => self.on_drain(now),
@@ -240,10 +243,7 @@ impl State {
             last_heard: now,
             last_sent: now,
         };
-        match self.draining_since {
-            Some(_) => vec![Effect::Leave],
-            None => Vec::new(),
-        }
+        Vec::new()
     }
 
     fn on_evaluation(&mut self, message: &v1::Evaluation) -> Vec<Effect> {
@@ -275,9 +275,7 @@ impl State {
         let Computed::Complete { solved, elapsed_s } = computed else { return Vec::new() };
         self.held.remove(&task.batch);
         let result = batch::answer_to_message(task.batch, &solved, elapsed_s);
-        let mut effects = vec![Effect::Send(Request::Result(result))];
-        effects.extend(self.leave_if_idle());
-        effects
+        vec![Effect::Send(Request::Result(result))]
     }
 
     fn on_lost(&mut self) -> Vec<Effect> {
@@ -286,7 +284,9 @@ impl State {
         let held = std::mem::take(&mut self.held);
         let mut effects: Vec<_> =
             held.into_iter().map(|batch| Effect::Abandon(self.task(batch))).collect();
-        effects.extend(self.leave_if_idle());
+        if self.is_draining() {
+            effects.push(Effect::Leave);
+        }
         effects
     }
 
@@ -295,17 +295,18 @@ impl State {
             return Vec::new();
         }
         self.draining_since = Some(now);
-        let mut effects = Vec::new();
-        if self.is_attached() {
-            effects.push(Effect::Send(Request::Drain(v1::WorkerDrain {})));
+        match self.link {
+            Link::Down => vec![Effect::Leave],
+            // Batches may be on their way even to a worker that holds none: the coordinator closes the
+            // stream when it has heard this and nothing is open any more.
+            Link::Greeting | Link::Attached { .. } => {
+                vec![Effect::Send(Request::Drain(v1::WorkerDrain {}))]
+            }
         }
-        effects.extend(self.leave_if_idle());
-        effects
     }
 
     fn on_tick(&mut self, now: Duration) -> Vec<Effect> {
-        let drained_for = self.draining_since.map(|since| now.saturating_sub(since));
-        if drained_for.is_some_and(|span| span >= Duration::from_secs_f64(DRAIN_S_MAX)) {
+        if self.draining_since.is_some_and(|since| self.has_drained(now, since)) {
             return vec![Effect::Leave];
         }
         if self.draining_since.is_none() && self.is_idle_too_long(now) {
@@ -327,8 +328,12 @@ impl State {
         }
     }
 
-    fn leave_if_idle(&self) -> Option<Effect> {
-        (self.draining_since.is_some() && self.held.is_empty()).then_some(Effect::Leave)
+    /// Returns whether a worker that has been draining `since` leaves without being dismissed.
+    fn has_drained(&self, now: Duration, since: Duration) -> bool {
+        let idle_since = if self.held.is_empty() { self.idle_since.max(since) } else { now };
+        let idle = now.saturating_sub(idle_since);
+        now.saturating_sub(since) >= Duration::from_secs_f64(DRAIN_S_MAX)
+            || idle >= Duration::from_secs_f64(DISMISSAL_S_MAX)
     }
 
     fn task(&self, batch: u64) -> Task {

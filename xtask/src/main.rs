@@ -6,6 +6,7 @@ mod deploy;
 mod digests;
 mod fleet;
 mod metrics;
+mod peers;
 mod python;
 mod random;
 mod reference;
@@ -38,6 +39,23 @@ const LINT: Cargo = &["clippy", "--workspace", "--all-targets", "--", "-D", "war
 const LINT_SHIPPED: Cargo = &["clippy", "--package", "osteon", "--", "-D", "warnings"];
 const DOCS: Cargo = &["doc", "--workspace", "--no-deps"];
 const TEST: Cargo = &["test", "--workspace"];
+/// Beside [`TEST`] only the root package is built again, and the crates of OpenTelemetry.
+const TEST_TRACING: Cargo =
+    &["test", "--workspace", "--features", "osteon/otel", "--test", "tracing"];
+const LINT_TRACING: Cargo = &[
+    "clippy",
+    "--package",
+    "osteon",
+    "--features",
+    "otel",
+    "--test",
+    "tracing",
+    "--bin",
+    "osteon",
+    "--",
+    "-D",
+    "warnings",
+];
 
 const BENCH: &[Cargo] = &[
     &["bench", "--package", "osteon-solver", "--bench", "table"],
@@ -82,12 +100,18 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(deploy::check),
     ),
     (
+        "tracing",
+        "the tests of tracing, on a program with the feature otel, and its lints",
+        Action::Cargo(&[TEST_TRACING, LINT_TRACING]),
+    ),
+    (
         "ci",
-        "what CI runs: lint, deny, every test, metrics, the client in Python, deploy, Slurm if installed",
+        "what CI runs: lint, deny, every test, tracing, metrics, the client in Python, deploy, Slurm if installed",
         Action::Commands(&[
             &["lint"],
             &["deny"],
             &["test"],
+            &["tracing"],
             &["metrics"],
             &["python"],
             &["deploy"],
@@ -124,6 +148,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         "bench-fleet",
         "measures jobs on fleets of simulated workers; --help lists the options",
         Action::Function(fleet::bench),
+    ),
+    (
+        "bench-peers",
+        "compares the overhead with that of xargs, Dask, Ray and HyperQueue: --rounds N (3)",
+        Action::Function(peers::bench),
     ),
     ("docs", "the documentation of all crates", Action::Cargo(&[DOCS])),
 ];

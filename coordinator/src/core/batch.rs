@@ -51,6 +51,17 @@ pub(crate) enum Purpose {
 }
 
 impl Purpose {
+    /// Returns its name in metrics and spans.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Fill => "fill",
+            Self::Exclusive => "exclusive",
+            Self::Speculative => "speculative",
+            Self::Audit { .. } => "audit",
+            Self::TieBreak => "tie_break",
+        }
+    }
+
     /// Returns whether the answer fills indices of an evaluation.
     pub(crate) fn fills(self) -> bool {
         matches!(self, Self::Fill | Self::Exclusive | Self::Speculative)

@@ -4,6 +4,9 @@
 //! Meanwhile the core would answer nobody. So it hands the evaluation and its search out
 //! ([`Effect::Complete`](crate::core::effect::Effect::Complete)), and gets a record to store back.
 
+use std::panic::resume_unwind;
+use std::thread;
+
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::JobId;
 use crate::store::EvaluationRecord;
@@ -36,7 +39,12 @@ impl Completion {
     pub fn run(self) -> Completed {
         let Self { job, evaluation, search: mut after } = self;
         let attempt = evaluation.attempt;
-        let record = evaluation.complete(after.has_decays()).map(|(outcomes, estimated_error)| {
+        let (outcomes, estimated_error) = thread::scope(|scope| {
+            let errors = scope.spawn(|| evaluation.estimated_error());
+            let outcomes = evaluation.outcomes(after.has_decays());
+            (outcomes, errors.join().unwrap_or_else(|panic| resume_unwind(panic)))
+        });
+        let record = outcomes.map(|outcomes| {
             let is_last = evaluation.diverges_from_store(&outcomes);
             let (number, point) = (evaluation.number, evaluation.point);
             let workers = evaluation.workers.iter().cloned().collect();

@@ -83,6 +83,11 @@ impl Crashes {
         self.0.len()
     }
 
+    /// Returns the number of losses after a time.
+    pub(crate) fn count_after(&self, time: Duration) -> usize {
+        self.0.iter().filter(|loss| loss.at > time).count()
+    }
+
     /// Returns the hosts of the lost workers.
     pub(crate) fn hosts(&self) -> BTreeSet<&str> {
         self.0.iter().map(|loss| loss.worker.host()).collect()
@@ -101,6 +106,11 @@ impl Crashes {
     /// Returns the time of the last loss.
     pub(crate) fn last(&self) -> Option<Duration> {
         self.0.iter().map(|loss| loss.at).max()
+    }
+
+    /// Returns whether one more loss is the last for which the task is tried.
+    pub(crate) fn permit_only_one_more(&self) -> bool {
+        self.0.len() + 1 >= LOSS_LIMIT
     }
 
     /// Returns whether enough workers were lost that the task is poison. `untried` returns whether

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use osteon_common::outcome::{Outcome, RealizationResult, encode};
+use osteon_common::outcome::{FailureKind, Outcome, RealizationResult, encode};
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::quantile;
@@ -306,23 +306,29 @@ impl PendingEvaluation {
     /// Returns all outcomes in index order, `with_decays` or without, and the estimated errors of the
     /// successes, once it is settled.
     pub fn complete(&self, with_decays: bool) -> Option<(Outcomes, Option<EstimatedError>)> {
-        if !self.is_settled() {
+        Some((self.outcomes(with_decays)?, self.estimated_error()))
+    }
+
+    /// Returns all outcomes in index order, `with_decays` or without, once it is settled.
+    pub(crate) fn outcomes(&self, with_decays: bool) -> Option<Outcomes> {
+        if !self.is_settled() || self.results.iter().any(Option::is_none) {
             return None;
         }
-        // With a known length nothing is copied while it grows: there may be millions.
-        let mut outcomes = Vec::with_capacity(self.results.len());
-        let mut errors = Vec::with_capacity(self.results.len());
-        for result in &self.results {
-            let RealizationResult { outcome, estimated_error, .. } = (*result)?;
-            outcomes.push(outcome);
-            if outcome.is_ok() {
-                errors.push(estimated_error);
-            }
-        }
+        // None is empty. With a known length they are written to their place at once.
+        let empty = Err(FailureKind::NotFinite);
+        let outcomes: Outcomes =
+            self.results.iter().map(|result| result.map_or(empty, |it| it.outcome)).collect();
         let decays =
             with_decays.then(|| self.results.iter().flatten().map(|solved| solved.decay).collect());
-        let outcomes = Outcomes::from(outcomes).with_decays(decays);
-        Some((outcomes, quantile::estimated_error(errors)))
+        Some(outcomes.with_decays(decays))
+    }
+
+    /// Returns the estimated errors of the successes so far.
+    pub(crate) fn estimated_error(&self) -> Option<EstimatedError> {
+        let mut errors = Vec::with_capacity(self.results.len());
+        let successes = self.results.iter().flatten().filter(|solved| solved.outcome.is_ok());
+        errors.extend(successes.map(|solved| solved.estimated_error));
+        quantile::estimated_error(errors)
     }
 }
 

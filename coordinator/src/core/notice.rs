@@ -89,6 +89,8 @@ pub enum Departure {
     Closed(CloseReason),
     /// Its stream ended.
     StreamEnded,
+    /// Its stream ended after it had begun to drain.
+    Left,
 }
 
 impl fmt::Display for Departure {
@@ -96,6 +98,7 @@ impl fmt::Display for Departure {
         match self {
             Self::Closed(reason) => reason.fmt(f),
             Self::StreamEnded => f.write_str("its connection ended"),
+            Self::Left => f.write_str("this worker has left while it drained"),
         }
     }
 }
@@ -103,7 +106,7 @@ impl fmt::Display for Departure {
 impl Departure {
     /// Returns whether the worker left or was drained: nothing is wrong with it.
     pub fn is_orderly(&self) -> bool {
-        matches!(self, Self::Closed(CloseReason::Drained | CloseReason::Draining))
+        matches!(self, Self::Left | Self::Closed(CloseReason::Drained | CloseReason::Draining))
     }
 }
 
@@ -123,8 +126,11 @@ impl Notice {
             Self::WorkerDetached { worker, name, batches, why } => {
                 let (host, process, reason) = (name.host(), name.process(), why.to_string());
                 // A worker that held nothing is not a loss, whatever the reason.
-                if why.is_orderly() || *batches == 0 {
+                if *batches == 0 {
                     tracing::info!(%worker, host, process, reason, "worker disconnected");
+                } else if why.is_orderly() {
+                    tracing::info!(%worker, host, process, batches, reason,
+                        "worker disconnected; others compute the batches it returns");
                 } else {
                     tracing::warn!(%worker, host, process, batches, reason,
                         "worker lost; others compute what it held");

@@ -19,6 +19,9 @@ use crate::store::{PartPiece, PartRecord};
 pub(crate) const SAVE_AFTER: Duration = Duration::from_millis(1500);
 /// Interval at which further results of an evaluation are saved.
 pub(crate) const SAVE_EVERY: Duration = Duration::from_secs(1);
+/// Maximum number of results of an evaluation that are saved at once: nothing else happens while they
+/// are copied. The rest follows at the next tick.
+pub(crate) const SAVED_AT_ONCE_MAX: u64 = 1 << 18;
 /// Maximum number of results in a piece: it may be audited as a whole.
 const PIECE_MAX: usize = 4096;
 
@@ -78,14 +81,18 @@ impl SavedParts {
     }
 }
 
-/// Takes the results of an evaluation that are not in the store yet, as a record; `None` if there are
-/// none, or if any are disputed.
-pub(crate) fn take_unsaved(evaluation: &mut PendingEvaluation, job: JobId) -> Option<PartRecord> {
+/// Takes results of an evaluation that are not in the store yet, at most `most` of them, as a record;
+/// `None` if there are none, or if any are disputed.
+pub(crate) fn take_unsaved(
+    evaluation: &mut PendingEvaluation,
+    job: JobId,
+    most: u64,
+) -> Option<PartRecord> {
     if evaluation.unsaved.is_empty() || !evaluation.disputes.is_empty() {
         return None;
     }
     let mut pieces = Vec::new();
-    for indices in std::mem::take(&mut evaluation.unsaved) {
+    for indices in take_first(&mut evaluation.unsaved, most) {
         evaluation.visit_runs(indices, PIECE_MAX, |first, by, run| {
             let results = run.iter().copied().flatten().collect();
             pieces.push(PartPiece { first, by: by.clone(), results });
@@ -93,4 +100,47 @@ pub(crate) fn take_unsaved(evaluation: &mut PendingEvaluation, job: JobId) -> Op
     }
     let point = evaluation.point;
     (!pieces.is_empty()).then_some(PartRecord { job, point, pieces })
+}
+
+/// Takes the first `most` indices.
+fn take_first(of: &mut Vec<Indices>, most: u64) -> Vec<Indices> {
+    let mut left = most;
+    let whole = of.iter().take_while(|indices| {
+        let fits = indices.count <= left;
+        left -= if fits { indices.count } else { 0 };
+        fits
+    });
+    let whole = whole.count();
+    let mut taken: Vec<Indices> = of.drain(..whole).collect();
+    if let Some(next) = of.first_mut().filter(|_| left > 0) {
+        taken.push(Indices { first: next.first, count: left });
+        next.first += left;
+        next.count -= left;
+    }
+    taken
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn indices_are_taken_from_the_front() {
+        let indices = |ranges: &[(u64, u64)]| -> Vec<Indices> {
+            ranges.iter().map(|&(first, count)| Indices { first, count }).collect()
+        };
+        let all = [(7, 3), (20, 5), (0, 2)];
+        for (most, taken, left) in [
+            (0, &[][..], &all[..]),
+            (2, &[(7, 2)], &[(9, 1), (20, 5), (0, 2)]),
+            (3, &[(7, 3)], &[(20, 5), (0, 2)]),
+            (4, &[(7, 3), (20, 1)], &[(21, 4), (0, 2)]),
+            (10, &all, &[]),
+            (u64::MAX, &all, &[]),
+        ] {
+            let mut of = indices(&all);
+            assert_eq!(take_first(&mut of, most), indices(taken), "{most}");
+            assert_eq!(of, indices(left), "{most}");
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use osteon_proto::spans::TraceContext;
 use osteon_proto::v1;
 use tokio::sync::{mpsc, oneshot, watch};
 
@@ -16,6 +17,7 @@ use crate::core::reactor::react;
 use crate::core::snapshot;
 use crate::core::state::State;
 use crate::service::failing::{ComponentFailure, FailureReporter};
+use crate::service::job_spans::JobSpans;
 use crate::service::meter::{CoreReport, Meter};
 use crate::service::outbound::{self, EvaluationMessages, NotReading, Outbound};
 use crate::store::thread::StoreCommand;
@@ -26,6 +28,8 @@ pub(crate) enum Message {
     Event(Event),
     /// A client sends a request and waits for the answer.
     Ask(Request, oneshot::Sender<Answer>),
+    /// A client submits a job, as part of this trace if it has one, and waits for the answer.
+    Submit(Request, Option<TraceContext>, oneshot::Sender<Answer>),
     /// A client requests to watch a job.
     Watch(JobId, oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>),
     /// A worker's stream began; messages to it go to `outbound`.
@@ -71,6 +75,8 @@ pub(crate) struct Core {
     failing: FailureReporter,
     /// Present if metrics are exported.
     meter: Option<Meter>,
+    /// Present if spans are recorded.
+    spans: Option<JobSpans>,
     config: Config,
 }
 
@@ -82,6 +88,7 @@ impl Core {
         events: mpsc::Sender<Event>,
         failing: FailureReporter,
         meter: Option<Meter>,
+        spans: Option<JobSpans>,
     ) -> Self {
         let config = state.config;
         Self {
@@ -98,6 +105,7 @@ impl Core {
             stopped: false,
             failing,
             meter,
+            spans,
             config,
         }
     }
@@ -112,6 +120,9 @@ impl Core {
         let mut followups = VecDeque::new();
         if let Some(meter) = &mut self.meter {
             meter.started(&self.state, &effects, self.clock.now());
+        }
+        if let Some(spans) = &mut self.spans {
+            spans.after(&self.state, &effects, self.clock.now());
         }
         self.apply(effects, &mut followups);
         self.handle(followups);
@@ -131,11 +142,14 @@ impl Core {
         match message {
             Message::Event(event) => self.handle(VecDeque::from([event])),
             Message::Ask(request, reply) => {
-                let reply_id = ReplyId(self.next_reply_id);
-                self.next_reply_id += 1;
-                // Requests whose clients have gone are dropped.
-                self.waiting.retain(|_, reply| !reply.is_closed());
-                self.waiting.insert(reply_id, reply);
+                let reply_id = self.expect(reply);
+                self.handle(VecDeque::from([Event::Requested { reply_id, request }]));
+            }
+            Message::Submit(request, client, reply) => {
+                let reply_id = self.expect(reply);
+                if let Some(spans) = &mut self.spans {
+                    spans.submitted(reply_id, client, self.clock.now());
+                }
                 self.handle(VecDeque::from([Event::Requested { reply_id, request }]));
             }
             Message::Watch(job, reply) => self.watch(job, reply),
@@ -151,6 +165,16 @@ impl Core {
         }
     }
 
+    /// Returns a number for a request that is answered to `reply`.
+    fn expect(&mut self, reply: oneshot::Sender<Answer>) -> ReplyId {
+        let reply_id = ReplyId(self.next_reply_id);
+        self.next_reply_id += 1;
+        // Requests whose clients have gone are dropped.
+        self.waiting.retain(|_, reply| !reply.is_closed());
+        self.waiting.insert(reply_id, reply);
+        reply_id
+    }
+
     /// Reacts to events, and to the events that the effects cause.
     fn handle(&mut self, mut events: VecDeque<Event>) {
         while let Some(event) = events.pop_front() {
@@ -160,7 +184,13 @@ impl Core {
             }
             let now = self.clock.now();
             let reading = self.meter.as_mut().map(|meter| meter.begin(&self.state, &event, now));
+            if let Some(spans) = &mut self.spans {
+                spans.before(&event, now);
+            }
             let effects = react(&mut self.state, event, now);
+            if let Some(spans) = &mut self.spans {
+                spans.after(&self.state, &effects, now);
+            }
             if let Some((meter, reading)) = self.meter.as_mut().zip(reading.as_ref()) {
                 meter.reacted(reading, &self.state, &effects, now);
             }
@@ -180,10 +210,11 @@ impl Core {
                     self.send(worker, welcome, followups);
                 }
                 Effect::Send { worker, batch, work } => {
+                    let trace = self.spans.as_ref().and_then(|spans| spans.context(batch));
                     // Apart, because `queue` borrows the rest.
                     let mut evaluations = std::mem::take(&mut self.evaluations);
                     self.queue(worker, followups, |outbound| {
-                        outbound.send_batch(batch, &work, &mut evaluations)
+                        outbound.send_batch(batch, &work, trace, &mut evaluations)
                     });
                     self.evaluations = evaluations;
                 }

@@ -8,6 +8,7 @@ use futures::Stream;
 use osteon_common::limits::{
     FETCHES_AT_ONCE_MAX, FETCHES_PER_CALLER_MAX, NAME_BYTES_MAX, PRIORITY_MAX,
 };
+use osteon_proto::spans::{TRACEPARENT, TraceContext};
 use osteon_proto::status::Resource;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
@@ -79,10 +80,17 @@ impl JobsService {
     async fn ask(&self, request: event::Request) -> Result<Answer, Status> {
         let (reply, answer) = oneshot::channel();
         self.send(Message::Ask(request, reply)).await?;
-        match answer.await.map_err(|_| stopped())? {
-            Answer::Refused(refusal) => Err(refused(&refusal)),
-            answer => Ok(answer),
-        }
+        answered(answer).await
+    }
+
+    async fn submit_traced(
+        &self,
+        request: event::Request,
+        client: Option<TraceContext>,
+    ) -> Result<Answer, Status> {
+        let (reply, answer) = oneshot::channel();
+        self.send(Message::Submit(request, client, reply)).await?;
+        answered(answer).await
     }
 
     async fn snapshot(&self, request: event::Request) -> Result<Option<JobSnapshot>, Status> {
@@ -120,6 +128,8 @@ impl Jobs for JobsService {
         &self,
         request: Request<SubmitRequest>,
     ) -> Result<Response<SubmitResponse>, Status> {
+        let client_span = request.metadata().get(TRACEPARENT);
+        let client_span = client_span.and_then(|text| TraceContext::parse(text.to_str().ok()?));
         let holder = request.extensions().get::<HolderName>().map(|HolderName(name)| name.clone());
         let SubmitRequest { specification: message, request_id, client, priority, name } =
             request.into_inner();
@@ -143,7 +153,7 @@ impl Jobs for JobsService {
             .map_err(|violations| status::invalid_argument(&violations))?;
         let specification = Arc::new(specification);
         let submit = event::Request::Submit { specification, request_id, client, priority, name };
-        match self.ask(submit).await? {
+        match self.submit_traced(submit, client_span).await? {
             Answer::Submitted(job) => Ok(Response::new(SubmitResponse { job: job.to_string() })),
             _ => Err(unexpected()),
         }
@@ -298,6 +308,13 @@ impl Jobs for JobsService {
             elapsed_s: elapsed.as_secs_f64(),
         });
         Ok(Response::new(ListBansResponse { workers: workers.collect() }))
+    }
+}
+
+async fn answered(answer: oneshot::Receiver<Answer>) -> Result<Answer, Status> {
+    match answer.await.map_err(|_| stopped())? {
+        Answer::Refused(refusal) => Err(refused(&refusal)),
+        answer => Ok(answer),
     }
 }
 

@@ -8,9 +8,11 @@ use std::net::SocketAddr;
 use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 use std::time::SystemTime;
 
 use osteon_proto::identity::host_name;
+use osteon_proto::spans::SpanRecorder;
 use thiserror::Error;
 use tokio::net::{TcpListener, UnixListener, UnixStream};
 
@@ -97,6 +99,8 @@ pub struct Listener {
     pub(crate) policy: Policy,
     /// Present if metrics are exported.
     pub(crate) metrics: Option<MetricsListener>,
+    /// Present if spans are recorded.
+    pub(crate) spans: Option<Arc<dyn SpanRecorder>>,
     url: String,
 }
 
@@ -145,7 +149,7 @@ impl Listener {
             _ => format!("https://{local}"),
         };
         let (bound, policy) = (BoundSocket::Tcp(listener), Policy::Tls(tokens));
-        Ok(Self { bound, file: None, tls: Some(tls), policy, metrics: None, url })
+        Ok(Self { bound, file: None, tls: Some(tls), policy, metrics: None, spans: None, url })
     }
 
     /// Admits only holders of tokens.
@@ -158,6 +162,12 @@ impl Listener {
     #[must_use]
     pub fn with_metrics(self, metrics: MetricsListener) -> Self {
         Self { metrics: Some(metrics), ..self }
+    }
+
+    /// Records the spans of jobs, if there is a recorder.
+    #[must_use]
+    pub fn with_spans(self, spans: Option<Arc<dyn SpanRecorder>>) -> Self {
+        Self { spans, ..self }
     }
 
     /// Returns the URL that clients and workers use: `https://HOST:PORT`, `http://127.0.0.1:PORT`
@@ -193,7 +203,7 @@ impl Listener {
 
     /// Returns a listener that admits everybody.
     fn open(bound: BoundSocket, file: Option<SocketFile>, url: String) -> Self {
-        Self { bound, file, tls: None, policy: Policy::Everybody, metrics: None, url }
+        Self { bound, file, tls: None, policy: Policy::Everybody, metrics: None, spans: None, url }
     }
 }
 

@@ -5,7 +5,9 @@ use std::time::Duration;
 use osteon_proto::announced::Announced;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::evaluation::{self, EvaluationInput};
-use osteon_proto::status::resource_exhausted;
+use osteon_proto::spans::TraceContext;
+use osteon_proto::status::{resource_exhausted, unavailable};
+use osteon_proto::v1;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::{AttachResponse, BatchRevoke, Heartbeat, WorkerDrain, WorkerWelcome};
 use tokio::sync::{mpsc, oneshot};
@@ -21,6 +23,9 @@ pub(crate) const OUTBOUND_MAX: usize = 96;
 
 /// Time after which a worker that was refused for lack of room may try again.
 const RETRY: Duration = Duration::from_secs(30);
+/// Time after which the workers of a coordinator that stops may look for the next one: none can be
+/// there sooner, and thousands of workers need not ask before.
+const RETRY_STOPPED: Duration = Duration::from_secs(1);
 
 /// A message to a worker, or the status that ends its stream.
 pub(crate) type Outgoing = Result<AttachResponse, Status>;
@@ -52,7 +57,8 @@ impl Outbound {
         self.messages.try_send(message).map_err(|_| NotReading)
     }
 
-    /// Queues a batch, after its evaluation if the worker does not have it.
+    /// Queues a batch, with its position in a trace if it has one, after its evaluation if the worker
+    /// does not have it.
     ///
     /// # Errors
     /// As [`Outbound::send`].
@@ -60,13 +66,14 @@ impl Outbound {
         &mut self,
         id: BatchId,
         work: &Work,
+        trace: Option<TraceContext>,
         evaluations: &mut EvaluationMessages,
     ) -> Result<(), NotReading> {
         if self.announced.get(work.evaluation.id).is_none() {
             self.send(Ok(evaluations.of(&work.evaluation)))?;
             self.announced.announce(work.evaluation.id, ());
         }
-        self.send(Ok(batch(id, work)))
+        self.send(Ok(batch(id, work, trace)))
     }
 }
 
@@ -107,8 +114,9 @@ fn evaluation(evaluation: &EvaluationInput) -> AttachResponse {
 }
 
 /// Returns the message that sends a batch.
-fn batch(id: BatchId, work: &Work) -> AttachResponse {
-    respond(Response::Batch(batch::to_message(id.0, work)))
+fn batch(id: BatchId, work: &Work, trace: Option<TraceContext>) -> AttachResponse {
+    let trace = trace.map(TraceContext::to_message);
+    respond(Response::Batch(v1::Batch { trace, ..batch::to_message(id.0, work) }))
 }
 
 /// Returns the message that revokes a batch.
@@ -144,7 +152,7 @@ pub(crate) fn status(reason: &CloseReason) -> Status {
             Code::Aborted
         }
         CloseReason::Drained => Code::Ok,
-        CloseReason::Draining => Code::Unavailable,
+        CloseReason::Draining => return unavailable(reason.to_string(), RETRY_STOPPED),
     };
     Status::new(code, reason.to_string())
 }
@@ -187,7 +195,7 @@ mod tests {
         let (mut received, mut announced) = (Received::default(), Vec::new());
         let mut evaluations = EvaluationMessages::default();
         for id in ids {
-            outbound.send_batch(BatchId(9), &work(id), &mut evaluations).unwrap();
+            outbound.send_batch(BatchId(9), &work(id), None, &mut evaluations).unwrap();
             while let Ok(message) = stream.try_recv() {
                 match message.unwrap().message {
                     Some(Response::Evaluation(message)) => {
@@ -205,6 +213,16 @@ mod tests {
     }
 
     #[test]
+    fn a_worker_is_told_when_to_attach_again() {
+        let after = |reason: CloseReason| osteon_proto::status::retry_after(&status(&reason));
+        let full = CloseReason::TooManyWorkers { limit: 4096 };
+        assert_eq!(after(full), Some(Duration::from_secs(30)));
+        assert_eq!(after(CloseReason::Draining), Some(Duration::from_secs(1)));
+        // Nothing keeps a worker that was given up for lost from coming back at once.
+        assert_eq!(after(CloseReason::Expired { silent: Duration::from_secs(10) }), None);
+    }
+
+    #[test]
     fn an_evaluation_is_sent_before_its_first_batch_and_again_when_the_worker_has_lost_it() {
         for _stream in 0..2 {
             assert_eq!(announced([5, 5, 6, 5, 6]), [5, 6]);
@@ -218,15 +236,28 @@ mod tests {
     }
 
     #[test]
+    fn a_batch_has_further_bytes_only_if_it_is_traced() {
+        use prost::Message as _;
+        let trace = TraceContext { trace: 1 << 64 | 7, span: 8, sampled: true };
+        let sizes =
+            [None, Some(trace)].map(|trace| batch(BatchId(9), &work(5), trace).encoded_len());
+        // Without a trace: the batch with its numbers 9, 5, 0 (left out) and 1, in its envelope.
+        assert_eq!(sizes, [2 + 6, 2 + 6 + 2 + 27]);
+        let sent = batch(BatchId(9), &work(5), Some(trace));
+        let Some(Response::Batch(message)) = sent.message else { panic!("{sent:?}") };
+        assert_eq!(TraceContext::of_batch(&message), Some(trace));
+    }
+
+    #[test]
     fn an_evaluation_for_which_the_queue_has_no_room_is_not_taken_as_sent() {
         let (sender, mut stream) = mpsc::channel(2);
         let (mut outbound, _closed) = Outbound::new(sender);
         outbound.send(Ok(heartbeat())).unwrap();
         outbound.send(Ok(heartbeat())).unwrap();
         let mut evaluations = EvaluationMessages::default();
-        assert!(outbound.send_batch(BatchId(1), &work(5), &mut evaluations).is_err());
+        assert!(outbound.send_batch(BatchId(1), &work(5), None, &mut evaluations).is_err());
         while stream.try_recv().is_ok() {}
-        outbound.send_batch(BatchId(2), &work(5), &mut evaluations).unwrap();
+        outbound.send_batch(BatchId(2), &work(5), None, &mut evaluations).unwrap();
         let first = stream.try_recv().unwrap().unwrap();
         assert_eq!(first, evaluation(&work(5).evaluation));
     }

@@ -29,6 +29,7 @@ use crate::metrics::write_times::WriteTimes;
 use crate::service::accept;
 use crate::service::core_task::{Clock, Core, Message};
 use crate::service::failing::{ComponentFailure, FailureReporter, Guard};
+use crate::service::job_spans::JobSpans;
 use crate::service::jobs::JobsService;
 use crate::service::listen::Listener;
 use crate::service::meter::Meter;
@@ -91,6 +92,7 @@ pub struct Coordinator {
     store: JoinHandle<()>,
     metrics: Option<MetricsTask>,
     shutdown_timeout: Duration,
+    drained: bool,
 }
 
 /// The task that serves metrics; it ends when this is dropped.
@@ -151,6 +153,7 @@ pub async fn start(
     let metrics = listener.metrics.take().map(|listener| {
         MetricsTask::start(listener, MetricSources::new(messages.clone(), write_times))
     });
+    let listener_spans = listener.spans.take();
     let (policy, decided) = watch::channel(Arc::new(listener.policy.clone()));
     let (tls, shown) = listener.tls.clone().map(watch::channel).unzip();
     let router = services(&messages, &commands, decided, config).await?;
@@ -160,7 +163,8 @@ pub async fn start(
     let server = tokio::spawn(guarded(failing.guard(ComponentFailure::Server), server));
     let guard = failing.guard(ComponentFailure::Core);
     let meter = metrics.is_some().then(Meter::default);
-    let core = Core::new(state, clock, commands, events, failing.clone(), meter);
+    let spans = listener_spans.map(JobSpans::new);
+    let core = Core::new(state, clock, commands, events, failing.clone(), meter, spans);
     let core = core.run(effects, inbox, from_store, config.tick);
     let core = tokio::spawn(guarded(guard, core));
     tracing::info!(%url, "listening");
@@ -176,6 +180,7 @@ pub async fn start(
         store,
         metrics,
         shutdown_timeout: config.shutdown_timeout,
+        drained: false,
     })
 }
 
@@ -216,10 +221,13 @@ impl Coordinator {
         self.failing.first()
     }
 
-    /// Stops: sends no new batch, closes every stream and stores everything complete. Waits for
-    /// that at most [`Config::shutdown_timeout`]; evaluations that are not stored by then are
-    /// computed again by the next coordinator on the same store.
-    pub async fn shutdown(self) {
+    /// Sends no new batch, closes every stream and stores everything complete. Waits for that at most
+    /// [`Config::shutdown_timeout`]. Workers that end afterwards are not lost. All that is left to do
+    /// is [`Self::shutdown`].
+    pub async fn drain(&mut self) {
+        if std::mem::replace(&mut self.drained, true) {
+            return;
+        }
         self.failing.disarm();
         let stop = async {
             let (reply, stopped) = oneshot::channel();
@@ -231,6 +239,12 @@ impl Coordinator {
         if tokio::time::timeout(self.shutdown_timeout, stop).await.is_err() {
             tracing::warn!("shutting down before everything is stored");
         }
+    }
+
+    /// Drains and stops; evaluations that are not stored by then are computed again by the next
+    /// coordinator on the same store.
+    pub async fn shutdown(mut self) {
+        self.drain().await;
         self.core.abort();
         let _ = self.core.await;
         drop(self.metrics);

@@ -44,6 +44,7 @@ use columns::{
 };
 use job_row::{damaged_end, job_columns, job_record};
 use log::Log;
+use parts::StaleParts;
 
 /// A store in a SQLite file.
 #[derive(Debug)]
@@ -58,6 +59,7 @@ pub struct SqliteStore {
     /// 0 if there is none.
     group: Cell<Option<JobId>>,
     log: Log,
+    stale: RefCell<StaleParts>,
 }
 
 impl Drop for SqliteStore {
@@ -97,7 +99,15 @@ impl SqliteStore {
         }
         let mark = RefCell::new(Mark::open(directory, &found, last)?);
         let log = Log::of(&mut connection).map_err(|source| opening::refusal(&path, source))?;
-        Ok(Self { connection, path, lock, mark, group: Cell::new(None), log })
+        Ok(Self {
+            connection,
+            path,
+            lock,
+            mark,
+            group: Cell::new(None),
+            log,
+            stale: RefCell::default(),
+        })
     }
 
     /// Creates a directory for a store, if there is none; other users cannot access it.
@@ -331,7 +341,7 @@ impl Store for &SqliteStore {
         let values = params![job.0, number, &point, outcomes, checksum, errors, workers];
         self.change(|connection| {
             connection.execute(sql, values)?;
-            parts::delete_at(connection, job, &point)?;
+            self.stale.borrow_mut().add_at(connection, job, &point)?;
             if is_last {
                 let sql = "DELETE FROM evaluation WHERE job = ?1 AND number > ?2";
                 connection.execute(sql, params![job.0, number])?;
@@ -379,7 +389,7 @@ impl Store for &SqliteStore {
         self.change(|connection| {
             connection.execute(sql, values)?;
             summary::put(connection, record.job, summary)?;
-            parts::delete_of(connection, record.job)
+            self.stale.borrow_mut().add_of(connection, record.job)
         })
     }
 
@@ -463,10 +473,17 @@ impl Store for &SqliteStore {
         deleted.map(drop).map_err(|source| self.refused(source))
     }
 
-    fn settle(&mut self) {
-        if let Err(error) = self.log.copy(&self.connection) {
-            tracing::warn!(%error, "the log of the store is not copied yet; it is tried again");
-        }
+    fn settle(&mut self) -> bool {
+        let deleted = self.stale.borrow_mut().delete_some(&self.connection);
+        let left = match deleted {
+            Ok(true) => Ok(true),
+            Ok(false) => self.log.copy(&self.connection).map(|()| false),
+            Err(error) => Err(error),
+        };
+        left.unwrap_or_else(|error| {
+            tracing::warn!(%error, "the store is not tidied up yet; it is tried again");
+            false
+        })
     }
 
     fn copy(&mut self, between: &mut BetweenPieces<'_>) -> Result<Option<File>, StoreError> {

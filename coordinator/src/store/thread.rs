@@ -69,15 +69,20 @@ pub(crate) fn serve(
 ) {
     let mut inbox = Inbox { commands, next: None };
     let (readings, copies) = (VecDeque::new(), VecDeque::new());
-    let mut desk = PendingWork { events, write_times, readings, copies };
+    let mut desk = PendingWork { events, write_times, readings, copies, unsettled: false };
     loop {
-        let command = if desk.readings.is_empty() && desk.copies.is_empty() {
-            match inbox.wait() {
-                Some(command) => Some(command),
-                None => return,
+        let mut command = inbox.take();
+        if matches!(command, Err(TryRecvError::Empty)) && desk.is_empty() {
+            if desk.unsettled {
+                desk.unsettled = store.settle();
+                continue;
             }
-        } else {
-            inbox.take().ok()
+            command = inbox.wait().ok_or(TryRecvError::Disconnected);
+        }
+        let command = match command {
+            Ok(command) => Some(command),
+            Err(TryRecvError::Disconnected) if desk.is_empty() => return,
+            Err(_) => None,
         };
         let others_first = matches!(command, Some(StoreCommand::Fetch(_)));
         if let Some(command) = command {
@@ -141,9 +146,15 @@ struct PendingWork<'a> {
     readings: VecDeque<ReadRequest>,
     /// One copy, and perhaps another whose reader has gone.
     copies: VecDeque<CopyReply>,
+    /// The store has work that no record waits for.
+    unsettled: bool,
 }
 
 impl PendingWork<'_> {
+    fn is_empty(&self) -> bool {
+        self.readings.is_empty() && self.copies.is_empty()
+    }
+
     fn run(&mut self, store: &mut dyn Store, inbox: &mut Inbox<'_>, command: StoreCommand) {
         match command {
             StoreCommand::Put(record) => {
@@ -158,9 +169,7 @@ impl PendingWork<'_> {
                 group.write(store, &mut report);
                 self.write_times.add(took.unwrap_or_else(|| begun.elapsed()));
                 // A large record is often followed by the end of its job, which should not wait.
-                if group.is_small() {
-                    store.settle();
-                }
+                self.unsettled = group.is_small();
             }
             StoreCommand::Read { job, number } => {
                 let found = store.evaluation(job, number).map_err(|error| unread(job, error));

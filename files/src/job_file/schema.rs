@@ -1,7 +1,7 @@
 //! The JSON Schema of job files, by which editors complete them.
 
 use osteon_common::case::Setup;
-use osteon_common::check::{COUNT, REPEATABILITY};
+use osteon_common::check::{COUNT, DECAY, REPEATABILITY};
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::parameters::Parameter;

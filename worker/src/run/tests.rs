@@ -13,6 +13,7 @@ use osteon_common::parameters::Point;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::evaluation::{self, EvaluationInput};
+use osteon_proto::status;
 use osteon_proto::v1::attach_response::Message as Reply;
 use osteon_proto::v1::workers_server::{Workers, WorkersServer};
 use osteon_proto::v1::{Batch, BatchRevoke, WorkerDrain, WorkerWelcome};
@@ -29,6 +30,8 @@ use crate::backend::Done;
 enum Script {
     /// Refuses the worker.
     Refuse,
+    /// Refuses the worker for now, and states that it may come back in an hour.
+    Defer,
     /// Accepts the worker and closes the stream.
     Leave,
     /// Accepts the worker and sends a batch that cannot be read.
@@ -66,6 +69,10 @@ impl Workers for FalseCoordinator {
         let mut script = Vec::new();
         match self.script {
             Script::Refuse => return Err(Status::failed_precondition("numerics differ")),
+            Script::Defer => {
+                let hour = Duration::from_secs(3600);
+                return Err(status::resource_exhausted("too many workers", hour));
+            }
             Script::Leave => script.push(Reply::Welcome(welcome)),
             Script::Garble => {
                 script.push(Reply::Welcome(welcome));
@@ -101,6 +108,8 @@ async fn take_answers(
     while let Ok(Some(AttachRequest { message: Some(message) })) = requests.message().await {
         let answered = match &message {
             Request::Result(result) => result.batch,
+            // It holds nothing any more.
+            Request::Drain(_) => return,
             _ => 0,
         };
         heard.lock().unwrap().push(message);
@@ -254,6 +263,7 @@ fn config(scene: &Scene) -> WorkerConfig {
         give_up_after: None,
         time_limit: None,
         idle_timeout: None,
+        spans: None,
     }
 }
 
@@ -270,6 +280,18 @@ async fn a_refusal_is_final() {
     assert!(matches!(&error, WorkerError::Refused { reason, .. } if reason == "numerics differ"));
     assert!(error.to_string().contains(&scene.endpoint.to_string()), "{error}");
     assert_eq!(scene.attachments.load(Ordering::SeqCst), 1);
+}
+
+#[tokio::test]
+async fn a_worker_that_is_refused_for_now_honours_the_delay() {
+    let scene = scene("defer", Script::Defer);
+    // Long enough for several waits of its own choice.
+    let config = WorkerConfig { give_up_after: Some(Duration::from_secs(1)), ..config(&scene) };
+    let error = run(config, pending()).await.unwrap_err();
+    assert!(matches!(error, WorkerError::GaveUp { .. }), "{error}");
+    assert!(error.to_string().contains("too many workers"), "{error}");
+    // It waits for the whole time that it has, and asks once more at its end.
+    assert_eq!(scene.attachments.load(Ordering::SeqCst), 2);
 }
 
 #[tokio::test]
@@ -304,6 +326,7 @@ async fn threads_have_bounds() {
             give_up_after: None,
             time_limit: None,
             idle_timeout: None,
+            spans: None,
         };
         let error = run(config, pending()).await.unwrap_err();
         assert!(matches!(error, WorkerError::Threads { .. }), "{error}");

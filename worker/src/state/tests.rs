@@ -47,13 +47,14 @@ impl Recorder {
 
     fn greet(&mut self) {
         self.state.attach();
-        self.message(Response::Welcome(v1::WorkerWelcome {
-            worker: 1,
-            lease: 1,
-            heartbeat_s: 1.0,
-            expiry_s: 5.0,
-        }));
+        self.message(welcome());
         self.nothing_else();
+    }
+
+    /// The coordinator closes the stream of a worker that has drained.
+    fn dismissed(&mut self) {
+        self.event(Event::Lost);
+        self.expect(&[Effect::Leave]);
     }
 
     fn event(&mut self, event: Event) {
@@ -94,6 +95,10 @@ impl Recorder {
     fn nothing_else(&self) {
         assert_eq!(self.effects, []);
     }
+}
+
+fn welcome() -> Response {
+    Response::Welcome(v1::WorkerWelcome { worker: 1, lease: 1, heartbeat_s: 1.0, expiry_s: 5.0 })
 }
 
 fn work() -> Work {
@@ -236,7 +241,65 @@ fn a_drained_worker_finishes_what_it_holds() {
     worker.complete(1, 5);
     worker.expect(&[answer(5)]);
     worker.complete(1, 4);
-    worker.expect(&[answer(4), Effect::Leave]);
+    worker.expect(&[answer(4)]);
+    worker.dismissed();
+}
+
+/// The coordinator sends a batch before it has heard that the worker drains.
+#[test]
+fn a_batch_on_its_way_to_a_worker_that_drains_is_answered() {
+    let mut worker = Recorder::attached();
+    worker.event(Event::Drain);
+    worker.expect(&[DRAIN]);
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    // It was idle for a long time before, and may still need some time.
+    worker.tick_at(4.9);
+    worker.expect(&[HEARTBEAT]);
+    worker.complete(1, 4);
+    worker.expect(&[answer(4)]);
+    worker.dismissed();
+}
+
+#[test]
+fn a_worker_that_drains_before_its_welcome_tells_so_and_answers_what_is_on_its_way() {
+    let mut worker = Recorder::new();
+    worker.state.attach();
+    worker.event(Event::Drain);
+    worker.expect(&[DRAIN]);
+    worker.message(welcome());
+    worker.evaluation(EVALUATION);
+    worker.batch(4);
+    worker.expect(&[compute(1, 4)]);
+    worker.complete(1, 4);
+    worker.expect(&[answer(4)]);
+    worker.dismissed();
+}
+
+#[test]
+fn a_worker_that_drains_waits_for_its_dismissal_only_so_long() {
+    let mut idle = Recorder::attached();
+    idle.now = Duration::from_secs(3);
+    idle.event(Event::Drain);
+    idle.expect(&[DRAIN]);
+    idle.tick_at(4.9);
+    idle.expect(&[HEARTBEAT]);
+    idle.tick_at(5.0);
+    idle.expect(&[Effect::Leave]);
+    // The time begins with the last answer.
+    let mut busy = Recorder::attached();
+    busy.batch(4);
+    busy.expect(&[compute(1, 4)]);
+    busy.event(Event::Drain);
+    busy.expect(&[DRAIN]);
+    busy.now = Duration::from_secs(4);
+    busy.complete(1, 4);
+    busy.expect(&[answer(4)]);
+    busy.message(Response::Heartbeat(v1::Heartbeat {}));
+    busy.tick_at(5.9);
+    busy.expect(&[HEARTBEAT]);
+    busy.tick_at(6.0);
+    busy.expect(&[Effect::Leave]);
 }
 
 #[test]
@@ -250,17 +313,16 @@ fn a_worker_that_the_coordinator_sends_away_answers_what_it_holds_and_leaves() {
     worker.message(leave());
     worker.nothing_else();
     worker.complete(1, 4);
-    worker.expect(&[answer(4), Effect::Leave]);
+    worker.expect(&[answer(4)]);
+    worker.dismissed();
     let mut idle = Recorder::attached();
     idle.message(leave());
-    idle.expect(&[DRAIN, Effect::Leave]);
+    idle.expect(&[DRAIN]);
+    idle.dismissed();
 }
 
 #[test]
-fn an_idle_worker_leaves_at_once() {
-    let mut worker = Recorder::attached();
-    worker.event(Event::Drain);
-    worker.expect(&[DRAIN, Effect::Leave]);
+fn a_worker_without_a_coordinator_leaves_at_once() {
     let mut alone = Recorder::new();
     alone.event(Event::Drain);
     alone.expect(&[Effect::Leave]);
@@ -291,7 +353,8 @@ fn a_worker_without_work_leaves_after_its_idle_timeout() {
     worker.tick_at(22.0);
     worker.expect(&[HEARTBEAT]);
     worker.tick_at(23.0);
-    worker.expect(&[DRAIN, Effect::Leave]);
+    worker.expect(&[DRAIN]);
+    worker.dismissed();
 }
 
 #[test]
@@ -375,7 +438,9 @@ fn malformed(defect: Malformed) -> Effect {
 
 #[test]
 fn a_batch_of_an_unknown_evaluation_ends_the_worker() {
-    let of = |evaluation| Response::Batch(v1::Batch { batch: 1, evaluation, first: 0, count: 1 });
+    let of = |evaluation| {
+        Response::Batch(v1::Batch { batch: 1, evaluation, count: 1, ..v1::Batch::default() })
+    };
     let unknown = |evaluation| [malformed(Malformed::UnknownEvaluation { evaluation })];
     let mut worker = Recorder::attached();
     worker.message(of(7));

@@ -11,8 +11,10 @@ use rusqlite::Connection;
 
 /// Pages in the log from which on it is copied between records.
 const DUE_PAGES: i32 = 1000;
-/// Pages in the log from which on it is copied at once: about 200 MB.
-const FULL_PAGES: i32 = 50_000;
+/// Pages in the log from which on it is copied at once: 800 MB.
+const FULL_PAGES: i32 = 200_000;
+/// Size to which a file that was longer shrinks when the log starts again, bytes.
+const FILE_BYTES: i64 = 64 << 20;
 
 /// Length of the log.
 #[derive(Debug)]
@@ -24,11 +26,16 @@ pub(super) struct Log {
 impl Log {
     /// Takes over the copying from SQLite.
     pub(super) fn of(connection: &mut Connection) -> rusqlite::Result<Self> {
+        Self::with_full(connection, FULL_PAGES)
+    }
+
+    fn with_full(connection: &mut Connection, full_pages: i32) -> rusqlite::Result<Self> {
+        connection.pragma_update(None, "journal_size_limit", FILE_BYTES)?;
         let pages = Arc::new(AtomicI32::new(0));
         let length = Arc::clone(&pages);
         connection.wal_hook(Some(move |log: &mut rusqlite::hooks::Wal, pages| {
             length.store(pages, Ordering::Relaxed);
-            if pages < FULL_PAGES { Ok(()) } else { log.checkpoint() }
+            if pages < full_pages { Ok(()) } else { log.checkpoint() }
         }))?;
         Ok(Self { pages })
     }
@@ -57,7 +64,8 @@ mod tests {
         let mut connection = Connection::open(&path).unwrap();
         connection.pragma_update(None, "journal_mode", "WAL").unwrap();
         connection.execute_batch("CREATE TABLE blobs (bytes BLOB)").unwrap();
-        let log = Log::of(&mut connection).unwrap();
+        let full_pages = 10 * DUE_PAGES;
+        let log = Log::with_full(&mut connection, full_pages).unwrap();
         let put = |pages: i32| {
             let sql = "INSERT INTO blobs VALUES (zeroblob(?1))";
             connection.execute(sql, [pages * 4096]).unwrap();
@@ -72,7 +80,7 @@ mod tests {
         assert_eq!(copied(), before, "the record is reported first");
         log.copy(&connection).unwrap();
         assert!(copied() > 2000, "{} pages", copied());
-        put(FULL_PAGES);
-        assert!(copied() > 50_000, "{} pages", copied());
+        put(full_pages);
+        assert!(copied() > 12_000, "{} pages", copied());
     }
 }

@@ -202,6 +202,7 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
         transaction.execute_batch(SCHEMA)?;
     }
     transaction.execute_batch(parts::TABLE)?;
+    parts::delete_of_ended(&transaction)?;
     transaction.commit()
 }
 

@@ -2,6 +2,8 @@
 //!
 //! They are a help only: what is damaged, or of other numerics, is left out and computed again.
 
+use std::collections::VecDeque;
+
 use osteon_common::outcome::{RealizationResult, decode, encode};
 use osteon_common::version;
 use rusqlite::{Connection, params};
@@ -27,6 +29,8 @@ pub(super) const TABLE: &str = "
     CREATE UNIQUE INDEX IF NOT EXISTS part_place ON part (job, point, first, worker);
 ";
 
+/// Number of pieces that are deleted at once: a record may wait for it.
+const DELETED_AT_ONCE: usize = 128;
 /// Size of a result in a blob, bytes: its code, its velocity and its estimated error.
 const RESULT_BYTES: usize = 17;
 
@@ -56,10 +60,11 @@ pub(super) fn put(connection: &Connection, record: &PartRecord) -> rusqlite::Res
     Ok(())
 }
 
-/// Returns the parts of a job, in the order in which they were added.
+/// Returns the parts of a job whose evaluations are not stored, in the order in which they were added.
 pub(super) fn of_job(connection: &Connection, job: JobId) -> rusqlite::Result<Vec<PartRecord>> {
     let sql = "SELECT point, worker, first, results, fingerprint, checksum FROM part
-               WHERE job = ?1 ORDER BY number";
+               WHERE job = ?1 AND point NOT IN (SELECT point FROM evaluation WHERE job = ?1)
+               AND job NOT IN (SELECT job FROM ending) ORDER BY number";
     let mut select = connection.prepare(sql)?;
     let mut rows = select.query(params![job.0])?;
     let mut parts: Vec<PartRecord> = Vec::new();
@@ -85,16 +90,70 @@ pub(super) fn of_job(connection: &Connection, job: JobId) -> rusqlite::Result<Ve
     Ok(parts)
 }
 
-/// Deletes the parts of the evaluation at a point.
-pub(super) fn delete_at(connection: &Connection, job: JobId, point: &[u8]) -> rusqlite::Result<()> {
-    let mut delete = connection.prepare("DELETE FROM part WHERE job = ?1 AND point = ?2")?;
-    delete.execute(params![job.0, point]).map(drop)
-}
-
 /// Deletes the parts of a job.
 pub(super) fn delete_of(connection: &Connection, job: JobId) -> rusqlite::Result<()> {
     let mut delete = connection.prepare("DELETE FROM part WHERE job = ?1")?;
     delete.execute(params![job.0]).map(drop)
+}
+
+/// Deletes the parts of ended jobs.
+pub(super) fn delete_of_ended(connection: &Connection) -> rusqlite::Result<()> {
+    connection.execute_batch("DELETE FROM part WHERE job IN (SELECT job FROM ending)")
+}
+
+/// Parts that nobody needs any more: their evaluation is stored, or their job has ended. There may be
+/// much of them, so they are deleted a few at a time, when no record waits.
+#[derive(Debug, Default)]
+pub(super) struct StaleParts(VecDeque<(JobId, Option<Vec<u8>>)>);
+
+impl StaleParts {
+    /// Notes the parts of an evaluation that is being stored, at this point.
+    pub(super) fn add_at(
+        &mut self,
+        connection: &Connection,
+        job: JobId,
+        point: &[u8],
+    ) -> rusqlite::Result<()> {
+        let sql = "SELECT 1 FROM part WHERE job = ?1 AND point = ?2";
+        if connection.prepare(sql)?.exists(params![job.0, point])? {
+            self.0.push_back((job, Some(point.to_vec())));
+        }
+        Ok(())
+    }
+
+    /// Notes the parts of a job that is being ended.
+    pub(super) fn add_of(&mut self, connection: &Connection, job: JobId) -> rusqlite::Result<()> {
+        let sql = "SELECT 1 FROM part WHERE job = ?1";
+        if connection.prepare(sql)?.exists(params![job.0])? {
+            self.0.push_back((job, None));
+        }
+        Ok(())
+    }
+
+    /// Deletes some of them. Returns whether there may be more.
+    pub(super) fn delete_some(&mut self, connection: &Connection) -> rusqlite::Result<bool> {
+        let Some((job, point)) = self.0.front() else {
+            return Ok(false);
+        };
+        // What was noted may not have been stored in the end.
+        let deleted = match point {
+            Some(point) => {
+                let sql = "DELETE FROM part WHERE number IN (SELECT number FROM part
+                           WHERE job = ?1 AND point = ?2 AND EXISTS (SELECT 1 FROM evaluation
+                           WHERE evaluation.job = ?1 AND evaluation.point = ?2) LIMIT ?3)";
+                connection.execute(sql, params![job.0, point, DELETED_AT_ONCE])?
+            }
+            None => {
+                let sql = "DELETE FROM part WHERE number IN (SELECT number FROM part WHERE job = ?1
+                           AND EXISTS (SELECT 1 FROM ending WHERE ending.job = ?1) LIMIT ?2)";
+                connection.execute(sql, params![job.0, DELETED_AT_ONCE])?
+            }
+        };
+        if deleted < DELETED_AT_ONCE {
+            self.0.pop_front();
+        }
+        Ok(!self.0.is_empty())
+    }
 }
 
 fn part_checksum(

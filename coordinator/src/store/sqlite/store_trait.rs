@@ -18,8 +18,8 @@ impl Store for SqliteStore {
         (&*self).together(changes)
     }
 
-    fn settle(&mut self) {
-        (&*self).settle();
+    fn settle(&mut self) -> bool {
+        (&*self).settle()
     }
 
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {

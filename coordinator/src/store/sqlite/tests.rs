@@ -349,7 +349,15 @@ fn with_rollback_journal(directory: &Path) -> SqliteStore {
     let last = last_known(&connection).unwrap();
     let mark = Mark::open(directory, &found, last).unwrap().into();
     let log = Log::of(&mut connection).unwrap();
-    SqliteStore { connection, path, lock, mark, group: Cell::new(None), log }
+    SqliteStore {
+        connection,
+        path,
+        lock,
+        mark,
+        group: Cell::new(None),
+        log,
+        stale: RefCell::default(),
+    }
 }
 
 #[test]

@@ -218,11 +218,23 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
                 **choose_worker,
             )
         };
+    let risks_failing = risks_failing(state, batch, crashes, now);
     let fit = |worker: &AttachedWorker| {
-        is_fit(state, id, worker, now) && !state.is_failing(worker.name.host())
+        is_fit(state, id, worker, now) && (risks_failing || !state.is_failing(worker.name.host()))
     };
     let fit = state.workers.iter().filter(|(_, worker)| fit(worker));
     fit.min_by_key(rank).map(|(choose_worker, _)| *choose_worker)
+}
+
+/// Returns whether an exclusive batch may go to a host whose workers are lost whatever they hold: the
+/// holder has had the time of a lease to answer, and its host may be the worse one. After each loss
+/// since then the next wait is twice as long, and the last loss that would make the realization
+/// poison is not risked here, so that a bad node does not fail a job because another one is silent.
+fn risks_failing(state: &State, batch: &Batch, crashes: &Crashes, now: Duration) -> bool {
+    let lost = crashes.count_after(batch.begun);
+    let since = crashes.last().unwrap_or_default().max(batch.begun);
+    let wait = state.config.expiry * 2_u32.saturating_pow(u32::try_from(lost).unwrap_or(u32::MAX));
+    now.saturating_sub(since) >= wait && !crashes.permit_only_one_more()
 }
 
 /// Returns whether a worker shall get a duplicate of a batch: it is eligible, and holds no overdue

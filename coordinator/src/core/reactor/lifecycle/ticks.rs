@@ -9,7 +9,7 @@ use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::sequence;
 use crate::core::reactor::dispatch::poison;
 use crate::core::reactor::turn::Turn;
-use crate::core::saved::{self, SAVE_AFTER, SAVE_EVERY};
+use crate::core::saved::{self, SAVE_AFTER, SAVE_EVERY, SAVED_AT_ONCE_MAX};
 use crate::core::snapshot;
 use crate::core::state::{AttachedWorker, State};
 
@@ -109,6 +109,7 @@ pub(crate) fn store_again(turn: &mut Turn) {
 pub(crate) fn save_parts(turn: &mut Turn, before_stop: bool) {
     let now = turn.now;
     let age = if before_stop { Duration::ZERO } else { SAVE_AFTER };
+    let most = if before_stop { u64::MAX } else { SAVED_AT_ONCE_MAX };
     for id in &turn.state.active {
         let Some(job) = turn.state.jobs.get_mut(id) else {
             continue;
@@ -116,14 +117,15 @@ pub(crate) fn save_parts(turn: &mut Turn, before_stop: bool) {
         for evaluation in job.certain_mut() {
             let save_at = *evaluation.save_at.get_or_insert(now + SAVE_AFTER);
             if (before_stop || now >= save_at)
-                && let Some(part) = saved::take_unsaved(evaluation, *id)
+                && let Some(part) = saved::take_unsaved(evaluation, *id, most)
             {
-                evaluation.save_at = Some(now + SAVE_EVERY);
+                let next = if evaluation.unsaved.is_empty() { now + SAVE_EVERY } else { now };
+                evaluation.save_at = Some(next);
                 turn.effects.push(Effect::Store(Record::Part(part)));
             }
         }
         for mut complete in job.ahead.take_unsaved(now.saturating_sub(age)) {
-            let part = saved::take_unsaved(&mut complete, *id);
+            let part = saved::take_unsaved(&mut complete, *id, u64::MAX);
             turn.effects.extend(part.map(|part| Effect::Store(Record::Part(part))));
         }
     }

@@ -124,11 +124,19 @@ pub(crate) fn stream_ended(turn: &mut Turn, worker: WorkerId) {
 
 /// Removes a worker; the batches that it held are reassigned. Its later events are ignored.
 fn lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
+    let draining = turn.state.workers.get(&worker).is_some_and(|worker| worker.draining);
+    let why = match why {
+        // Its last batches were on their way when it began to drain, or took too long for it.
+        Departure::StreamEnded | Departure::Closed(CloseReason::NotReading) if draining => {
+            Departure::Left
+        }
+        why => why,
+    };
     let cause = cause(&why);
     let Some(gone) = departures::depart(turn, worker, why) else {
         return;
     };
-    let cause = if gone.draining { Cause::Announced } else { cause };
+    let cause = if draining { Cause::Announced } else { cause };
     if cause != Cause::Announced && !gone.in_flight.is_empty() {
         turn.state.count_loss(&gone.name, turn.now);
     }
@@ -147,8 +155,10 @@ fn lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
 
 /// Returns the cause of a loss, given the reason for the departure.
 fn cause(why: &Departure) -> Cause {
-    let Departure::Closed(reason) = why else {
-        return Cause::StreamBroke;
+    let reason = match why {
+        Departure::StreamEnded => return Cause::StreamBroke,
+        Departure::Left => return Cause::Announced,
+        Departure::Closed(reason) => reason,
     };
     match reason {
         CloseReason::Drained | CloseReason::Draining | CloseReason::Banned { .. } => {

@@ -99,3 +99,23 @@ fn an_ordinary_drain_is_told_as_one() {
     let told = idle.notices(Event::WorkerDrains { worker: WorkerId(2) });
     assert_eq!(detached(&told), (2, 0, &Departure::Closed(CloseReason::Drained)));
 }
+
+/// A batch crosses the message of a worker that drains: it leaves, or is killed, without an answer.
+#[test]
+fn a_worker_that_drained_and_left_is_not_lost_with_a_batch_that_was_on_its_way() {
+    let ends = [
+        end_of_stream(1),
+        // A batch for which the queue of a worker that has left has no place.
+        Event::Misbehaved { worker: WorkerId(1), reason: CloseReason::NotReading },
+    ];
+    for end in ends {
+        let mut rig = Rig::with(8, &[1]);
+        assert_eq!(rig.notices(Event::WorkerDrains { worker: WorkerId(1) }), []);
+        let told = rig.notices(end);
+        assert_eq!(detached(&told), (1, 2, &Departure::Left));
+        assert!(detached(&told).2.is_orderly());
+        // Its batches are not suspected, and go out at once as they were.
+        let sent = ["welcome 2, lease 2", "send 2: batch 3 = 2+1", "send 2: batch 4 = 3+1"];
+        rig.check(hello(2, 1), &sent);
+    }
+}

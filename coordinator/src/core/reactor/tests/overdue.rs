@@ -206,6 +206,52 @@ fn a_crash_over_a_duplicate_of_a_quarantined_realization_counts() {
     assert!(evaluation.quarantine.is_empty());
 }
 
+/// Returns a rig in which worker 2 holds realization 0 alone and is silent, and worker 3 is the only
+/// other one, on a host that lost three workers in a row.
+fn with_a_silent_worker_and_a_failing_host() -> Rig {
+    let mut rig = with_quarantined_realization();
+    for process in 100..103 {
+        rig.state.count_loss(&WorkerName::new("host 3", process, 0), rig.now);
+    }
+    rig.check(on_its_own(3), &["welcome 3, lease 3"]);
+    rig
+}
+
+/// The time after which a silent worker loses its lease.
+const LEASE: Duration = Duration::from_secs(10);
+
+#[test]
+fn an_overdue_quarantined_realization_goes_to_a_failing_host_after_the_time_of_a_lease() {
+    let mut rig = with_a_silent_worker_and_a_failing_host();
+    assert_eq!(rig.live(LEASE - SECOND / 10), [""; 0]);
+    assert_eq!(rig.live(SECOND / 10), ["send 3: batch 3 = 0+1"]);
+    rig.check(answer(3, 3, 0, 1), &["revoke 2: batch 2", "store job 1 evaluation 0"]);
+}
+
+#[test]
+fn a_failing_host_does_not_make_a_realization_poison_while_a_silent_worker_holds_it() {
+    let mut rig = with_a_silent_worker_and_a_failing_host();
+    let begun = rig.now;
+    let mut sent = Vec::new();
+    for process in 4.. {
+        let Some(effect) = rig.live(SECOND).pop() else {
+            if rig.now < begun + 590 * SECOND {
+                continue;
+            }
+            break;
+        };
+        assert!(effect.starts_with("send "), "{effect}");
+        sent.push((rig.now - begun).as_secs());
+        let lost = rig.batch(rig.state.next_batch - 1).worker;
+        rig.event(end_of_stream(lost.0));
+        rig.event(hello_on("host 3", process, process as u32, 1));
+    }
+    assert_eq!(sent, [10, 30, 70, 150, 310]);
+    let effects = rig.live(11 * SECOND);
+    assert!(effects[0].starts_with("close 2: this worker has not answered"), "{effects:?}");
+    assert!(!effects.iter().any(|effect| effect.starts_with("store")), "{effects:?}");
+}
+
 #[test]
 fn what_was_computed_ahead_and_not_answered_is_overdue_when_it_is_asked_for() {
     let mut rig = Rig::new();

@@ -111,3 +111,30 @@ fn a_file_of_a_version_without_parts_is_opened() {
     store.put_part(&part(1, 0)).unwrap();
     assert_eq!(store.parts(JobId(1)).unwrap(), [part(1, 0)]);
 }
+
+#[test]
+fn stale_parts_are_deleted_when_there_is_time() {
+    let (directory, mut store) = store();
+    let rows = |store: &SqliteStore| -> Vec<u64> {
+        let mut select = store.connection.prepare("SELECT job FROM part ORDER BY job").unwrap();
+        select.query_map([], |row| row.get(0)).unwrap().map(Result::unwrap).collect()
+    };
+    let all = rows(&store);
+    let (of_one, of_two) = all.split_at(all.iter().filter(|job| **job == 1).count());
+    assert!(!store.settle() && rows(&store) == all, "what is needed stays");
+
+    store.put_evaluation(&evaluation(1, 1), true).unwrap();
+    assert_eq!(rows(&store), all, "the record does not wait");
+    assert!(!store.settle());
+    assert!(rows(&store).len() < all.len());
+    store.finish_job(&end(1), &summary(1)).unwrap();
+    store.settle();
+    assert_eq!(rows(&store), of_two);
+
+    // Nobody may have had time for it.
+    store.finish_job(&end(2), &summary(1)).unwrap();
+    assert!(!of_one.is_empty() && rows(&store) == of_two);
+    drop(store);
+    let store = SqliteStore::open(directory.path()).unwrap();
+    assert!(rows(&store).is_empty());
+}
