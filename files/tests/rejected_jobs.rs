@@ -14,6 +14,8 @@ use osteon_files::job_file;
 
 use support::pin;
 
+#[path = "rejected_jobs/decays.rs"]
+mod decays;
 #[path = "rejected_jobs/objective.rs"]
 mod objective;
 #[path = "rejected_jobs/posterior.rs"]
@@ -384,28 +386,6 @@ fn noise_of_the_data() {
     check("rejected_data_noise", JobKind::Identification, &edits);
     let below = edited(given, &format!("{given}\nrepeatability = 40.6"));
     assert_eq!(refusal(&below, JobKind::Identification), "ACCEPTED");
-}
-
-#[test]
-fn decays_of_the_data() {
-    let given = "velocities = [3900.5, 4000, 3950.25]";
-    let moments = "mean = 3900.0\ncoefficient_of_variation = 0.03\n";
-    let edits = [
-        format!("{given}\ndecays = [4.5, 4.6]"),
-        format!("{given}\ndecays = [4.5, 4.6, 462.0]"),
-        format!("{given}\ndecays = [4.5, 4.6, \"x\"]"),
-        format!("{given}\ndecays = 4.5"),
-        format!("{given}\ndecays = [4.5, 4.6, 4.4]"),
-        format!("{given}\ndecay = \"decay\""),
-        format!("{moments}decay = \"decay\"\ndecays = [4.5]"),
-        "velocities = \"v.csv\"\ndecays = [4.5, 4.6]".to_owned(),
-        "velocities = \"v.csv\"\ndecay = 3".to_owned(),
-        "groups.a = { velocities = [3900.0, 4000.0], decays = [4.5, 4.6] }\ngroups.b = [3900.0, 4000.0]"
-            .to_owned(),
-        "groups.a = { velocities = [3900.0, 4000.0], decays = [4.5] }".to_owned(),
-    ];
-    let edits = edits.each_ref().map(|to| (given, to.as_str()));
-    check("rejected_decays", JobKind::Identification, &edits);
 }
 
 #[test]

@@ -106,7 +106,7 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "ci",
-            "what CI runs: lint, deny, every test, tracing, metrics, Python, deploy, Slurm if installed",
+        "what CI runs: lint, deny, every test, tracing, metrics, Python, deploy, Slurm if installed",
         Action::Commands(&[
             &["lint"],
             &["deny"],

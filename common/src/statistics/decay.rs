@@ -11,7 +11,7 @@ use super::sum::Sum;
 
 /// Number, mean and standard deviation of a set of decays.
 #[derive(Clone, Copy)]
-struct Scatter {
+struct DecayScatter {
     count: f64,
     mean: f64,
     deviation: f64,
@@ -41,7 +41,7 @@ pub fn decay_estimate(monte_carlo: &MonteCarlo, outcomes: &Outcomes) -> Option<D
             blocks::standard_error(influences, doubling, monte_carlo, found.count).mean
         }
     };
-    let Scatter { mean, deviation: standard_deviation, .. } = found;
+    let DecayScatter { mean, deviation: standard_deviation, .. } = found;
     Some(DecayEstimate { mean, standard_deviation, standard_error })
 }
 
@@ -49,7 +49,7 @@ pub fn decay_estimate(monte_carlo: &MonteCarlo, outcomes: &Outcomes) -> Option<D
 /// between subjects if these are given; `None` if none were measured.
 pub fn measured_decay(set: &VelocitySet<'_>) -> Option<DecayEstimate> {
     let decays = set.decays?;
-    let Scatter { mean, deviation: standard_deviation, .. } = scatter(decays.iter().copied())?;
+    let DecayScatter { mean, deviation: standard_deviation, .. } = scatter(decays.iter().copied())?;
     let variance = covariance_of_means(set, decays.iter().map(|decay| [decay - mean]));
     let standard_error = variance.map_or(f64::NAN, |[[variance]]| variance.sqrt());
     Some(DecayEstimate { mean, standard_deviation, standard_error })
@@ -84,11 +84,11 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     (count > 0).then(|| (count as f64, sum.total() / count as f64))
 }
 
-fn scatter(values: impl Iterator<Item = f64> + Clone) -> Option<Scatter> {
+fn scatter(values: impl Iterator<Item = f64> + Clone) -> Option<DecayScatter> {
     let (count, mean) = mean(values.clone())?;
     let mut squares = Sum::default();
     values.for_each(|value| squares.add((value - mean) * (value - mean)));
-    Some(Scatter { count, mean, deviation: (squares.total() / count).sqrt() })
+    Some(DecayScatter { count, mean, deviation: (squares.total() / count).sqrt() })
 }
 
 #[cfg(test)]

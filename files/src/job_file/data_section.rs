@@ -38,7 +38,11 @@ pub(super) const KEYS: [Key; 12] = [
     },
     Key {
         name: "decay",
-        meaning: "name of the CSV column that holds the decay along the array (dB/cm, -100 to 100, with a                   mean above 0) measured with each velocity, in every row: the mean decay is matched                   beside the moments of the velocities, see [below](#decays); requires the objective                   `\"chi_square\"`, the search `\"simplex\"`, no `[posterior]`, and at least ten                   velocities, or subjects, in each group",
+        meaning: "name of the CSV column that holds the decay along the array (dB/cm, -100 to 100, with a \
+                  mean above 0) measured with each velocity, in every row: the mean decay is matched \
+                  beside the moments of the velocities, see [below](#decays); requires the objective \
+                  `\"chi_square\"`, the search `\"simplex\"`, no `[posterior]`, and at least ten \
+                  velocities, or subjects, in each group",
     },
     Key {
         name: "known",
@@ -249,6 +253,48 @@ fn decays(reader: &mut Reader, table: &Table<'_>) -> Option<Option<Vec<f64>>> {
     Some(Some(reader.numbers(&table.path("decays"), elements)?))
 }
 
+/// Keys that belong to a file of velocities, and what is wrong with each beside a list.
+const OF_A_FILE: [(&str, &str); 4] = [
+    (
+        "group",
+        "names a column of a file, but velocities is a list; give the name of a CSV file, or [data.groups]",
+    ),
+    (
+        "known",
+        "names columns of a file, but velocities is a list; give the name of a CSV file, or the values in \
+         [data.groups]",
+    ),
+    (
+        "subject",
+        "names a column of a file, but velocities is a list; give the name of a CSV file, or the list \
+         `subjects`",
+    ),
+    (
+        "decay",
+        "names a column of a file, but velocities is a list; give the name of a CSV file, or the list `decays`",
+    ),
+];
+/// Keys that belong to a list of velocities, and what is wrong with each beside a file.
+const OF_A_LIST: [(&str, &str); 2] = [
+    (
+        "subjects",
+        "has a subject for each of a list of velocities, but velocities is a file; name its column: \
+         subject = \"…\"",
+    ),
+    (
+        "decays",
+        "has a decay for each of a list of velocities, but velocities is a file; name its column: decay = \
+         \"…\"",
+    ),
+];
+
+/// Records the first of these keys that is there; returns whether one is.
+fn has_misplaced(reader: &mut Reader, table: &Table<'_>, keys: &[(&str, &str)]) -> bool {
+    let Some((key, message)) = keys.iter().find(|(key, _)| table.has(key)) else { return false };
+    reader.violations.add(table.path(key), *message);
+    true
+}
+
 fn velocities(
     reader: &mut Reader,
     table: &Table<'_>,
@@ -260,47 +306,13 @@ fn velocities(
         ["group", "subject", "decay"].map(|key| column(reader, table, key));
     let known = known_columns(reader, table);
     match &table.get("velocities")?.value {
-        Value::List(_) if table.has("group") => {
-            let message = "names a column of a file, but velocities is a list; \
-                           give the name of a CSV file, or [data.groups]";
-            reader.violations.add(table.path("group"), message);
-            None
-        }
-        Value::List(_) if table.has("known") => {
-            let message = "names columns of a file, but velocities is a list; \
-                           give the name of a CSV file, or the values in [data.groups]";
-            reader.violations.add(table.path("known"), message);
-            None
-        }
-        Value::List(_) if table.has("subject") => {
-            let message = "names a column of a file, but velocities is a list; \
-                           give the name of a CSV file, or the list `subjects`";
-            reader.violations.add(table.path("subject"), message);
-            None
-        }
-        Value::List(_) if table.has("decay") => {
-            let message = "names a column of a file, but velocities is a list; \
-                           give the name of a CSV file, or the list `decays`";
-            reader.violations.add(table.path("decay"), message);
-            None
-        }
+        Value::List(_) if has_misplaced(reader, table, &OF_A_FILE) => None,
         Value::List(elements) => {
             let (subjects, decays) = (subjects(reader, table), decays(reader, table));
             let velocities = reader.numbers(&path, elements)?;
             Some(Measurements::Velocities { velocities, subjects: subjects?, decays: decays? })
         }
-        Value::Text(_) if table.has("decays") => {
-            let message = "has a decay for each of a list of velocities, but velocities is a file; \
-                           name its column: decay = \"…\"";
-            reader.violations.add(table.path("decays"), message);
-            None
-        }
-        Value::Text(_) if table.has("subjects") => {
-            let message = "has a subject for each of a list of velocities, but velocities is a file; \
-                           name its column: subject = \"…\"";
-            reader.violations.add(table.path("subjects"), message);
-            None
-        }
+        Value::Text(_) if has_misplaced(reader, table, &OF_A_LIST) => None,
         Value::Text(_) if table.has("known") && !table.has("group") => {
             let message = "has a value for each group, and there are no groups; name their column: group = \
                            \"…\"";

@@ -1,7 +1,7 @@
 //! The JSON Schema of job files, by which editors complete them.
 
 use osteon_common::case::Setup;
-use osteon_common::check::{COUNT, REPEATABILITY};
+use osteon_common::check::{COUNT, DECAY, REPEATABILITY};
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::parameters::Parameter;
@@ -98,9 +98,11 @@ fn data() -> Json {
     let list = || json!({ "type": "array", "items": above_zero() });
     let name = || json!({ "type": "string" });
     let subjects = || json!({ "type": "array", "items": { "type": "integer", "minimum": 0 } });
+    let decays = || json!({ "type": "array", "items": number(None, DECAY) });
     let of_group = [
         (Key { name: "velocities", meaning: "velocities of the group, m/s" }, list()),
         (Key { name: "subjects", meaning: "subject of each velocity, a whole number" }, subjects()),
+        (Key { name: "decays", meaning: "decay of each velocity, dB/cm" }, decays()),
     ];
     let of_group = of_group.map(|(key, schema)| (key.name.to_owned(), described(schema, key)));
     let known = |schema: &dyn Fn(Parameter) -> Json| {
@@ -124,13 +126,16 @@ fn data() -> Json {
     let columns = object(known(&column).into_iter().collect::<Map<_, _>>().into());
     group["required"] = json!(["velocities"]);
     let group = json!({ "anyOf": [list(), group] });
-    let types = [
+    // In the order of the keys.
+    let types: [Json; data_section::KEYS.len()] = [
         json!({ "anyOf": [name(), list()] }),
+        name(),
         name(),
         name(),
         columns,
         json!({ "type": "object", "additionalProperties": group }),
         subjects(),
+        decays(),
         above_zero(),
         above_zero(),
         json!({ "type": "integer", "minimum": COUNT.min, "maximum": COUNT.max }),
