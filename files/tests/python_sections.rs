@@ -1,7 +1,7 @@
 //! The sections of a job file as types of Python, made from the JSON Schema, which is made from the
 //! declared keys: names, ranges, defaults and descriptions cannot differ.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on should say where")]
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -17,7 +17,7 @@ pub(crate) struct PyEnsemble {
 
 enum Source {
     /// Any mean, with independent germs.
-    Law { law: ElasticityLaw, seed: u64 },
+    Law { law: Box<ElasticityLaw>, seed: u64 },
     /// The start of a job, with its germs.
     Job(Box<Ensemble>),
 }
@@ -48,7 +48,7 @@ impl PyEnsemble {
             let message = message.strip_prefix("dispersion ").unwrap_or(&message);
             errors::bad_input("dispersion", message)
         })?;
-        Ok(Self { source: Source::Law { law, seed } })
+        Ok(Self { source: Source::Law { law: Box::new(law), seed } })
     }
 
     /// Draws the tensors of the indices from `first` on, as an array (n, 6, 6).

@@ -72,8 +72,8 @@ pub(super) fn compared(
     let variances = variances(noise);
     let limit = |axis: usize| (NEGLIGIBLE * NEGLIGIBLE * variances[axis]).max(EXACT * EXACT);
     let negligible = |axis: usize| differences[axis] * differences[axis] <= limit(axis);
-    let is_off = !(negligible(0) && negligible(1)) || !is_near(decay, NEGLIGIBLE);
-    let held = is_on_bound(specification, point) && is_off;
+    let is_met = negligible(0) && negligible(1) && is_near(decay, NEGLIGIBLE);
+    let held = is_on_bound(specification, point) && !is_met;
     let normal = specification.data.as_ref().filter(|_| held);
     let counted = normal.map_or(variances, |data| at_most_normal(data, set, noise));
     Agreement {

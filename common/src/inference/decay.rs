@@ -88,12 +88,14 @@ fn inverse_factor(matrix: &[[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
         }
     }
     let mut inverse = [[0.0; 3]; 3];
-    for column in 0..3 {
-        for row in column..3 {
+    for row in 0..3 {
+        let mut solved = [0.0; 3];
+        for (column, value) in solved.iter_mut().enumerate().take(row + 1) {
             let unit = if row == column { 1.0 } else { 0.0 };
             let known: f64 = (column..row).map(|k| factor[row][k] * inverse[k][column]).sum();
-            inverse[row][column] = (unit - known) / factor[row][row];
+            *value = (unit - known) / factor[row][row];
         }
+        inverse[row] = solved;
     }
     Some(inverse)
 }

@@ -52,9 +52,9 @@ mod tests {
         let mut state = 1_u64;
         let mut random = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            let exponent = i32::try_from((state >> 40) % 120).unwrap() - 60;
-            let unit = (state >> 12) as f64 / (1_u64 << 52) as f64 - 0.5;
-            unit * 2.0_f64.powi(exponent)
+            // From 2^-60 to 2^59.
+            let scale = f64::from_bits((963 + (state >> 40) % 120) << 52);
+            scale * ((state >> 12) as f64 / (1_u64 << 52) as f64 - 0.5)
         };
         for length in 0..200 {
             let values: Vec<f64> = (0..length).map(|_| random()).collect();
