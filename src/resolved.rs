@@ -277,8 +277,7 @@ impl Resolved {
             Command::Token(arguments) => Self::Token(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
             Command::Submit(arguments) => {
-                let coordinator = remote(arguments.client.clone())?;
-                resolve_submit(arguments, coordinator)?
+                resolve_submit(remote(arguments.client.clone())?, arguments)?
             }
             Command::Jobs(arguments) => resolve_jobs(arguments, remote)?,
             Command::Workers(arguments) => resolve_workers(arguments, remote)?,
@@ -443,8 +442,8 @@ impl From<CredentialArguments> for CredentialFiles {
 }
 
 fn resolve_submit(
-    arguments: SubmitArguments,
     coordinator: Remote,
+    arguments: SubmitArguments,
 ) -> Result<Resolved, CommandFailure> {
     let SubmitArguments { job, client: _, propagate, request_id, name, priority, json } = arguments;
     Ok(Resolved::Submit {

@@ -7,7 +7,7 @@ use osteon_common::realization::Ensemble;
 use pyo3::prelude::*;
 
 use crate::errors;
-use crate::parallel::Plan;
+use crate::parallel::ParallelMap;
 
 /// Random bones around a mean, each a function of seed and index.
 #[pyclass(name = "Ensemble", module = "osteon._native", frozen)]
@@ -62,7 +62,7 @@ impl PyEnsemble {
         if first.checked_add(count as u64).is_none() {
             return Err(errors::bad_input("first", format!("is {first}; it is too large")));
         }
-        let plan = Plan { threads, progress: None };
+        let plan = ParallelMap { threads, progress: None };
         let drawn = plan.map(py, count, |index, (): &mut ()| self.tensor(first + index as u64))?;
         let mut numbers = Vec::with_capacity(36 * count);
         for tensor in drawn {

@@ -20,7 +20,7 @@ const POLL: Duration = Duration::from_millis(50);
 const CHUNK: usize = 8;
 
 /// How to compute, and whom to tell.
-pub(crate) struct Plan {
+pub(crate) struct ParallelMap {
     /// Number of threads, at least 1.
     pub(crate) threads: usize,
     /// Called with the number of results so far; an exception ends the computation.
@@ -41,7 +41,7 @@ struct Shared {
     changed: Condvar,
 }
 
-impl Plan {
+impl ParallelMap {
     /// Returns `compute` of 0, 1, … `count` - 1, each with the scratch memory `W` of its thread.
     ///
     /// # Errors

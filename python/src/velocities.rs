@@ -10,7 +10,7 @@ use osteon_solver::{Solver, Workspace};
 use pyo3::prelude::*;
 
 use crate::case::{PyCase, density_of};
-use crate::parallel::Plan;
+use crate::parallel::ParallelMap;
 use crate::{errors, solvers};
 
 /// Velocities, NaN where there is none, and the code of each failure, 0 where there is a velocity.
@@ -29,7 +29,7 @@ pub(crate) fn velocities_of_tensors<'py>(
 ) -> PyResult<PlainVelocities<'py>> {
     let solver = solvers::of(py, &case.case.setup)?;
     let bones = bones(&tensors, &densities)?;
-    let plan = Plan { threads, progress };
+    let plan = ParallelMap { threads, progress };
     let outcomes = plan.map(py, bones.len(), |index, memory: &mut Workspace| {
         solver.outcome(&bones[index], memory)
     })?;
@@ -55,7 +55,7 @@ pub(crate) fn velocities_of_cases<'py>(
             Some(progress) => Some(offset(py, progress, before)?),
             None => None,
         };
-        let plan = Plan { threads, progress };
+        let plan = ParallelMap { threads, progress };
         outcomes.extend(plan.map(py, group.len(), |index, memory: &mut Workspace| {
             solver.outcome(&group[index].bone, memory)
         })?);

@@ -44,14 +44,13 @@ fn decays_are_kept() {
     let mut record = evaluation(1, 0);
     record.outcomes = record.outcomes.with_decays(Some([4.6, 0.0, -0.5].into()));
     store.put_evaluation(&record, true).unwrap();
+    store.settle();
     drop(store);
     store = SqliteStore::open(directory.path()).unwrap();
     assert_eq!(store.parts(JobId(1)).unwrap(), [part(1, 1), with]);
     assert_eq!(store.evaluation(JobId(1), 0).unwrap(), Some(record.clone()));
     let lengths = |sql: &str| -> Vec<usize> {
-        let connection =
-            rusqlite::Connection::open(directory.path().join("osteon.sqlite")).unwrap();
-        let mut read = connection.prepare(sql).unwrap();
+        let mut read = store.connection.prepare(sql).unwrap();
         let rows = read.query_map([], |row| row.get(0)).unwrap();
         rows.map(Result::unwrap).collect()
     };
