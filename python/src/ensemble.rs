@@ -12,10 +12,10 @@ use crate::parallel::ParallelMap;
 /// Random bones around a mean, each a function of seed and index.
 #[pyclass(name = "Ensemble", module = "osteon._native", frozen)]
 pub(crate) struct PyEnsemble {
-    source: Source,
+    source: Bones,
 }
 
-enum Source {
+enum Bones {
     /// Any mean, with independent germs.
     Law { law: Box<ElasticityLaw>, seed: u64 },
     /// The start of a job, with its germs.
@@ -25,13 +25,13 @@ enum Source {
 impl PyEnsemble {
     /// Creates the ensemble of a job.
     pub(crate) fn of_job(ensemble: Ensemble) -> Self {
-        Self { source: Source::Job(Box::new(ensemble)) }
+        Self { source: Bones::Job(Box::new(ensemble)) }
     }
 
     fn tensor(&self, index: u64) -> Result<Elasticity, String> {
         let drawn = match &self.source {
-            Source::Law { law, seed } => law.realize(&Germs::draw(*seed, index)),
-            Source::Job(ensemble) => ensemble.bone(index).map(|bone| bone.elasticity),
+            Bones::Law { law, seed } => law.realize(&Germs::draw(*seed, index)),
+            Bones::Job(ensemble) => ensemble.bone(index).map(|bone| bone.elasticity),
         };
         drawn.map_err(|error| format!("the tensor of realization {index} {error}"))
     }
@@ -48,7 +48,7 @@ impl PyEnsemble {
             let message = message.strip_prefix("dispersion ").unwrap_or(&message);
             errors::bad_input("dispersion", message)
         })?;
-        Ok(Self { source: Source::Law { law: Box::new(law), seed } })
+        Ok(Self { source: Bones::Law { law: Box::new(law), seed } })
     }
 
     /// Draws the tensors of the indices from `first` on, as an array (n, 6, 6).

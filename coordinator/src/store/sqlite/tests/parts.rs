@@ -61,7 +61,8 @@ fn decays_are_kept() {
     // The outcome without a velocity has a decay.
     record.outcomes = record.outcomes.with_decays(Some([4.6, 1.0, -0.5].into()));
     store.put_evaluation(&record, true).unwrap();
-    assert_eq!(store.evaluation(JobId(1), 0).unwrap(), None);
+    let damaged = store.evaluation(JobId(1), 0).unwrap_err();
+    assert!(matches!(damaged, StoreError::Damaged { .. }), "{damaged}");
 }
 
 #[test]
