@@ -4,6 +4,7 @@ mod certs;
 mod check;
 mod coordinator;
 mod draw;
+mod init;
 mod jobs;
 mod observe;
 mod operators;
@@ -47,6 +48,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
         }
         Resolved::Certs(arguments) => certs::make(&arguments),
         Resolved::Token(arguments) => token::make(&arguments),
+        Resolved::Init(arguments) => init::write(&arguments),
         Resolved::Schema(arguments) => schema::print(&arguments),
         Resolved::Submit { job, kind, request, options, coordinator, format } => {
             let submission = jobs::Submission { job: &job, kind, request: &request, options };

@@ -14,7 +14,7 @@ use osteon_worker::WorkerConfig;
 use crate::arguments::{
     Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
     CredentialArguments, DrawArguments, JobsArguments, JobsCommand, LogFormat, ObserveArguments,
-    ProgressFormat, RunArguments, SchemaArguments, SimulateArguments, SubmitArguments,
+    InitArguments, ProgressFormat, RunArguments, SchemaArguments, SimulateArguments, SubmitArguments,
     TokenArguments, WatchArguments, WorkerArguments, WorkersArguments, WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
@@ -91,6 +91,8 @@ pub(crate) enum Resolved {
     Certs(CertsArguments),
     /// `token`.
     Token(TokenArguments),
+    /// `init`.
+    Init(InitArguments),
     /// Print a schema.
     Schema(SchemaArguments),
     /// `submit`.
@@ -275,6 +277,7 @@ impl Resolved {
             Command::Worker(arguments) => resolve_worker(arguments, &environment, cores, isa()?)?,
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
+            Command::Init(arguments) => Self::Init(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
             Command::Submit(arguments) => {
                 resolve_submit(remote(arguments.client.clone())?, arguments)?
