@@ -13,9 +13,10 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
-    CredentialArguments, DrawArguments, JobsArguments, JobsCommand, LogFormat, ObserveArguments,
-    ProgressFormat, RunArguments, SchemaArguments, SimulateArguments, SubmitArguments,
-    TokenArguments, WatchArguments, WorkerArguments, WorkersArguments, WorkersCommand,
+    CredentialArguments, DrawArguments, JobsArguments, JobsCommand, LogFormat, MaterialsArguments,
+    ObserveArguments, ProgressFormat, RunArguments, SchemaArguments, SimulateArguments,
+    SubmitArguments, TokenArguments, WatchArguments, WorkerArguments, WorkersArguments,
+    WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
@@ -93,6 +94,8 @@ pub(crate) enum Resolved {
     Token(TokenArguments),
     /// Print a schema.
     Schema(SchemaArguments),
+    /// `materials`.
+    Materials(MaterialsArguments),
     /// `submit`.
     Submit {
         /// The job file.
@@ -276,6 +279,7 @@ impl Resolved {
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
+            Command::Materials(arguments) => Self::Materials(arguments),
             Command::Submit(arguments) => {
                 resolve_submit(remote(arguments.client.clone())?, arguments)?
             }

@@ -1,5 +1,6 @@
 //! All developer commands: `cargo xtask COMMAND`. CI calls `cargo xtask ci`.
 
+mod book;
 mod chaos;
 mod deny;
 mod deploy;
@@ -106,13 +107,14 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "ci",
-        "what CI runs: lint, deny, every test, tracing, metrics, Python, deploy, Slurm if installed",
+        "what CI runs: lint, deny, every test, tracing, metrics, book, Python, deploy, Slurm if installed",
         Action::Commands(&[
             &["lint"],
             &["deny"],
             &["test"],
             &["tracing"],
             &["metrics"],
+            &["book"],
             &["python"],
             &["deploy"],
             &["slurm", slurm::IF_INSTALLED],
@@ -122,6 +124,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         "slurm",
         "tests the commands for Slurm on a real one on this machine; takes names of tests",
         Action::Function(slurm::test),
+    ),
+    (
+        "book",
+        "builds the documentation as a book, and checks its links",
+        Action::Function(book::build),
     ),
     (
         "tables",
