@@ -266,7 +266,10 @@ fn installed(name: &str, version: &str, options: &[&str]) -> Result<PathBuf> {
     let tools = programs()?.with_file_name("tools");
     let program = tools.join("bin").join(name);
     let present = Command::new(&program).arg("--version").output().is_ok_and(|output| {
-        String::from_utf8_lossy(&output.stdout).trim().split(' ').next_back() == Some(version)
+        let text = String::from_utf8_lossy(&output.stdout);
+        // Some print `name 1.2.3`, others `name v1.2.3`.
+        let last = text.trim().split(' ').next_back().unwrap_or_default();
+        last.strip_prefix('v').unwrap_or(last) == version
     });
     if !present {
         let install = ["install", name, "--version", version, "--locked", "--force", "--root"];
