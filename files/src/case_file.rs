@@ -75,7 +75,7 @@ fn bone(reader: &mut Reader, root: &Table<'_>) -> Option<Bone> {
         return None;
     }
     let base = Base::read(reader, &table);
-    let named = if table.has(materials::KEY) { Some(materials::KEY) } else { None };
+    let named = table.has(materials::KEY).then_some(materials::KEY);
     let given =
         named.or_else(|| CONSTANTS.map(Parameter::name).into_iter().find(|key| table.has(key)));
     // Matrices are written by programs and may have any scale; constants are typed by people, so
@@ -122,7 +122,9 @@ fn required(
     if !table.has(key) {
         let value = base.value(parameter);
         if value.is_none() {
-            reader.missing(table, key, accepted);
+            let cures = [key, materials::KEY].map(|key| table.path(key));
+            let message = format!("is missing; it must be {accepted}");
+            reader.lacks(&cures[0], &cures, message);
         }
         return value;
     }

@@ -72,6 +72,7 @@ fn wrong_names_and_combinations_are_refused() {
     let bones = [
         "[bone]\nmaterial = \"human-tibia\"".to_owned(),
         "[bone]\nmaterial = 3".to_owned(),
+        format!("[bone]\nmateriel = \"{NAME}\""),
         format!("[bone]\n{known}mandel = []"),
         format!("[bone]\n{known}density = 2.0"),
         format!("[bone]\n{known}longitudinal_poisson_ratio = 0.8"),
@@ -81,6 +82,7 @@ fn wrong_names_and_combinations_are_refused() {
         "[parameters]\nmaterial = \"Sawbones\"\ndispersion = { fixed = 0.1 }".to_owned(),
         "[parameters]\nmaterial = 1\ndispersion = { fixed = 0.1 }\ndensity = { bounds = [1, 2] }"
             .to_owned(),
+        format!("[parameters]\nmateriel = \"{NAME}\"\ndispersion = {{ fixed = 0.1 }}"),
         format!("[parameters]\n{known}"),
         format!("[parameters]\n{known}dispersion = {{ bounds = [0.1, 0.2] }}"),
         format!(

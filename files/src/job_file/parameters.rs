@@ -1,7 +1,5 @@
 //! `[parameters]`: the range of each parameter.
 
-use std::slice;
-
 use osteon_common::case::Setup;
 use osteon_common::fields::Key;
 use osteon_common::job::Range;
@@ -62,7 +60,11 @@ fn range(reader: &mut Reader, parameters: &Table<'_>, parameter: Parameter, base
             return Range::Fixed(value);
         }
         if !parameters.has(key) {
-            reader.lacks(&path, slice::from_ref(&path), format!("is missing; {RANGE_FORMS}"));
+            let mut cures = vec![path.clone()];
+            if parameter != Parameter::Dispersion {
+                cures.push(parameters.path(MATERIAL.name));
+            }
+            reader.lacks(&path, &cures, format!("is missing; {RANGE_FORMS}"));
         }
         return UNKNOWN;
     }
