@@ -80,6 +80,8 @@ pub(crate) enum Command {
     Certs(CertsArguments),
     /// Create an access token and its entry for the coordinator's token list
     Token(TokenArguments),
+    /// List published stiffness of cortical bone, which job and case files use by name
+    Materials(MaterialsArguments),
     /// Print the JSON Schema of a job file or of result.json
     Schema(SchemaArguments),
 }
@@ -380,6 +382,17 @@ pub(crate) struct SchemaArguments {
     /// `job`: job files; `result`: result.json and the output of a run with --json
     #[arg(value_enum, value_name = "FILE")]
     pub(crate) file: SchemaFile,
+}
+
+/// Arguments of `materials`.
+#[derive(Debug, Args)]
+pub(crate) struct MaterialsArguments {
+    /// Print values and reference of this material alone
+    #[arg(value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    /// Print values and references as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// A file that has a schema.

@@ -6,6 +6,7 @@ mod coordinator;
 mod draw;
 mod init;
 mod jobs;
+mod materials;
 mod observe;
 mod operators;
 mod run;
@@ -50,6 +51,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
         Resolved::Token(arguments) => token::make(&arguments),
         Resolved::Init(arguments) => init::write(&arguments),
         Resolved::Schema(arguments) => schema::print(&arguments),
+        Resolved::Materials(arguments) => materials::print(&arguments),
         Resolved::Submit { job, kind, request, options, coordinator, format } => {
             let submission = jobs::Submission { job: &job, kind, request: &request, options };
             let left = "the job may have been accepted (see `osteon jobs`)";

@@ -13,9 +13,10 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
-    CredentialArguments, DrawArguments, JobsArguments, JobsCommand, LogFormat, ObserveArguments,
-    InitArguments, ProgressFormat, RunArguments, SchemaArguments, SimulateArguments, SubmitArguments,
-    TokenArguments, WatchArguments, WorkerArguments, WorkersArguments, WorkersCommand,
+    CredentialArguments, DrawArguments, InitArguments, JobsArguments, JobsCommand, LogFormat,
+    MaterialsArguments, ObserveArguments, ProgressFormat, RunArguments, SchemaArguments,
+    SimulateArguments, SubmitArguments, TokenArguments, WatchArguments, WorkerArguments,
+    WorkersArguments, WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
@@ -95,6 +96,8 @@ pub(crate) enum Resolved {
     Init(InitArguments),
     /// Print a schema.
     Schema(SchemaArguments),
+    /// `materials`.
+    Materials(MaterialsArguments),
     /// `submit`.
     Submit {
         /// The job file.
@@ -279,6 +282,7 @@ impl Resolved {
             Command::Token(arguments) => Self::Token(arguments),
             Command::Init(arguments) => Self::Init(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
+            Command::Materials(arguments) => Self::Materials(arguments),
             Command::Submit(arguments) => {
                 resolve_submit(remote(arguments.client.clone())?, arguments)?
             }

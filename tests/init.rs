@@ -16,7 +16,10 @@ fn spreadsheet() -> Vec<u8> {
         let velocity = 3880 + k * 37 % 180;
         format!("M\u{fc}ller {};{};3,{}\r\n", k / 4, ["a", "b"][k as usize % 2], velocity - 3000)
     };
-    let text = format!("Patient;Gruppe;FAS (km/s)\r\nM\u{fc}ller 9;a;\r\n{}", (0..24).map(row).collect::<String>());
+    let text = format!(
+        "Patient;Gruppe;FAS (km/s)\r\nM\u{fc}ller 9;a;\r\n{}",
+        (0..24).map(row).collect::<String>()
+    );
     text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect()
 }
 

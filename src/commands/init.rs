@@ -59,7 +59,9 @@ pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFail
     if velocities.is_some() {
         let job = job_file::read_with_warnings(&path, JobKind::Identification);
         job.map_err(|error| {
-            CommandFailure::bad_input(anyhow!(error).context(format!("{shown} was written, but cannot be run yet")))
+            CommandFailure::bad_input(
+                anyhow!(error).context(format!("{shown} was written, but cannot be run yet")),
+            )
         })?;
     }
     Ok(ExitStatus::Done)
