@@ -33,6 +33,15 @@ class Package(TestCase):
             _program.find()
         self.assertIn("install the package again", str(caught.exception))
 
+    def test_a_program_of_another_version_is_an_exception(self) -> None:
+        script = self.scratch() / "osteon"
+        script.write_text("#!/bin/sh\necho 'osteon 0.0.1 (commit 0, numerics 1, result schema 1)'\n")
+        script.chmod(0o755)
+        with self.assertRaises(osteon.ProgramError) as caught:
+            _program.check_version(script)
+        for words in ("0.0.1", osteon.__version__, "install the package again"):
+            self.assertIn(words, str(caught.exception))
+
     def test_a_program_that_dies_is_an_exception(self) -> None:
         script = self.scratch() / "osteon"
         script.write_text("#!/bin/sh\nkill -KILL $$\n")
