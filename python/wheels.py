@@ -2,7 +2,7 @@
 linker of Zig, which brings the headers and symbols of old glibcs for every processor. Uses the standard library
 only; `cargo xtask wheels` calls it.
 
-The program of a wheel is built by cargo-zigbuild's rules, too: it is placed among the scripts of maturin, as
+maturin builds the module; cargo-zigbuild builds the program, which is placed among maturin's scripts, as
 `backend/osteon_build.py` does for this machine."""
 
 import argparse
@@ -27,8 +27,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--work", required=True, type=pathlib.Path, help="where to build and install to")
     parser.add_argument("--profile", default="release", help="profile of cargo (release)")
-    parser.add_argument("processors", nargs="*", choices=[*PROCESSORS, []], help="all without any")
+    parser.add_argument("processors", nargs="*", help=f"of {', '.join(PROCESSORS)}; all without any")
     arguments = parser.parse_args()
+    for processor in set(arguments.processors) - set(PROCESSORS):
+        parser.error(f"{processor} is none of {', '.join(PROCESSORS)}")
     check_version()
     work = arguments.work.absolute()
     python = make(work / "venv", HERE / "wheels.txt")

@@ -46,6 +46,8 @@ class RayWorkers:
         # An actor whose node dies is started on another.
         self._make = ray.remote(num_cpus=threads, max_restarts=-1)(OsteonWorker)
         self._actors: list[Any] = []
+        # Questions that an actor has not answered: it is asked again only after that.
+        self._asked: dict[Any, Any] = {}
         try:
             self.scale(workers)
             if patience > 0 and workers > 0:
@@ -64,9 +66,11 @@ class RayWorkers:
 
     def statuses(self) -> list[WorkerStatus]:
         """What became of the workers that Ray has placed."""
-        asked = [actor.status.remote() for actor in self._actors]
-        ready, _ = ray.wait(asked, num_returns=len(asked), timeout=1.0) if asked else ([], [])
-        found = []
+        asked = {actor: self._asked.get(actor) or actor.status.remote() for actor in self._actors}
+        answers = list(asked.values())
+        ready, _ = ray.wait(answers, num_returns=len(answers), timeout=1.0) if answers else ([], [])
+        self._asked = {actor: answer for actor, answer in asked.items() if answer not in ready}
+        found: list[WorkerStatus] = []
         for answer in ready:
             try:
                 found.append(ray.get(answer))

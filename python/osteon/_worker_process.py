@@ -180,10 +180,10 @@ def await_attached(
         if found and not waiting:
             return
         if time.monotonic() > deadline:
-            count = f"{len(waiting)} of {len(found)}" if found else "none of the"
+            count = f"{len(waiting)} of {len(found)}" if found else "the"
             said = f"; one said: {waiting[0].message}" if waiting and waiting[0].message else ""
             raise CoordinatorError(
-                f"{count} workers have attached to the coordinator at {coordinator} within "
+                f"{count} workers have not attached to the coordinator at {coordinator} within "
                 f"{patience:g} s{said}. Is it running, and can the cluster reach this address?"
             )
         time.sleep(POLL_S)

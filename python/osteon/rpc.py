@@ -40,7 +40,7 @@ MESSAGE_MAX = 64 << 20
 KEEPALIVE_MS = 20_000
 """Time without a message after which a client asks whether the coordinator is there."""
 
-OPTIONS = (
+OPTIONS: tuple[tuple[str, str | int], ...] = (
     ("grpc.max_receive_message_length", MESSAGE_MAX),
     ("grpc.max_send_message_length", MESSAGE_MAX),
     ("grpc.keepalive_time_ms", KEEPALIVE_MS),
@@ -73,9 +73,9 @@ def jobs(
     """
     target, secret = resolved(coordinator, credentials or Credentials())
     if secret is None:
-        channel = grpc.insecure_channel(target, OPTIONS)
+        channel = grpc.insecure_channel(target, options(target))
     else:
-        channel = grpc.secure_channel(target, secret, OPTIONS)
+        channel = grpc.secure_channel(target, secret, options(target))
     return jobs_pb2_grpc.JobsStub(channel), channel
 
 
@@ -85,10 +85,16 @@ def jobs_async(
     """The same as :func:`jobs`, for `asyncio`."""
     target, secret = resolved(coordinator, credentials or Credentials())
     if secret is None:
-        channel = grpc.aio.insecure_channel(target, OPTIONS)
+        channel = grpc.aio.insecure_channel(target, options(target))
     else:
-        channel = grpc.aio.secure_channel(target, secret, OPTIONS)
+        channel = grpc.aio.secure_channel(target, secret, options(target))
     return jobs_pb2_grpc.JobsStub(channel), channel
+
+
+def options(target: str) -> tuple[tuple[str, str | int], ...]:
+    """The options of a channel."""
+    # The name of the server would be the path of the socket, which is none.
+    return (*OPTIONS, ("grpc.default_authority", "localhost")) if target.startswith("unix:") else OPTIONS
 
 
 def resolved(

@@ -44,7 +44,8 @@ class Ray(unittest.TestCase):
                     break
             pool.scale(1)
             until(lambda: program_workers(self.service.url) == 1, "one worker leaves")
-            self.assertEqual(client.wait(job).status, "done")
+            self.assertFalse(client.state(job).has_ended)
+            self.assertEqual(client.wait(job).status, "converged")
             self.assertEqual(client.fetch(job).digest, digest_of(BIG))
         until(lambda: program_workers(self.service.url) == 0, "the workers leave")
 
