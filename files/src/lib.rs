@@ -9,6 +9,7 @@
 pub mod case_file;
 pub mod document;
 pub mod file_error;
+pub mod init;
 pub mod job_file;
 pub mod posterior_csv;
 mod reader;

@@ -2,12 +2,15 @@
 
 use osteon_common::case::Setup;
 use osteon_common::check::{COUNT, DECAY, REPEATABILITY};
-use osteon_common::fields::{DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
+use osteon_common::fields::{Choice, DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::parameters::Parameter;
 use serde_json::{Map, Value as Json, json};
 
+use super::csv_format::MISSING_MAX;
+use super::data_section::GROUP_COLUMNS_MAX;
 use super::{data_section, parameters, posterior, priors};
+use crate::velocities::{DecimalMark, Separator, VelocityUnit};
 
 /// Returns the JSON Schema (draft 2020-12) of a job file in TOML or JSON, with a final newline. It
 /// states names, types and ranges; relations between keys are checked when a file is read.
@@ -126,10 +129,20 @@ fn data() -> Json {
     let columns = object(known(&column).into_iter().collect::<Map<_, _>>().into());
     group["required"] = json!(["velocities"]);
     let group = json!({ "anyOf": [list(), group] });
+    let choice = |choice: &dyn Choice| json!({ "enum": choice.names(), "default": choice.name() });
+    let texts = |most: usize| json!({ "type": "array", "items": name(), "maxItems": most });
+    let mut group_columns = texts(GROUP_COLUMNS_MAX);
+    group_columns["minItems"] = 1.into();
     // In the order of the keys.
     let types: [Json; data_section::KEYS.len()] = [
         json!({ "anyOf": [name(), list()] }),
         name(),
+        choice(&VelocityUnit::default()),
+        choice(&Separator::default()),
+        choice(&DecimalMark::default()),
+        texts(MISSING_MAX),
+        name(),
+        json!({ "anyOf": [name(), group_columns] }),
         name(),
         name(),
         columns,
