@@ -12,10 +12,9 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
-from osteon import _program
+from osteon import _native, _program
 from osteon._states import Credentials, options
 from osteon.errors import CoordinatorError, ProgramError, refuse
 
@@ -63,7 +62,7 @@ class WorkerPlan:
         if not coordinator.startswith(("https://", "http://", "unix:")):
             allowed = "it must be https://HOST:PORT, http://HOST:PORT or unix:PATH"
             refuse("coordinator", f"is {coordinator!r}; {allowed}")
-        return cls(coordinator, credentials, version("osteon"))
+        return cls(coordinator, credentials, _native.version()[0])
 
     def command(self, threads: int) -> list[str]:
         """The arguments of the program."""
@@ -83,7 +82,7 @@ class WorkerProcess:
         self._failed: OSError | None = None
         self._process: subprocess.Popen[str] | None = None
         self._started = threading.Event()
-        found = version("osteon")
+        found = _native.version()[0]
         if found != plan.version:
             raise ProgramError(differs(self._place, found, plan.version))
         command = [sys.executable, "-I", "-S", str(LEASH), str(os.getpid()), str(_program.find())]
@@ -138,9 +137,13 @@ class WorkerProcess:
     def status(self) -> WorkerStatus:
         """What became of it."""
         assert self._process is not None
-        exit_code = self._exit_code
         return WorkerStatus(
-            self._place, self._process.pid, version("osteon"), self._attached, exit_code, self._message
+            self._place,
+            self._process.pid,
+            _native.version()[0],
+            self._attached,
+            self._exit_code,
+            self._message,
         )
 
     def drain(self) -> None:

@@ -13,14 +13,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from osteon._states import Credentials
-from osteon._worker_process import WorkerPlan, WorkerStatus
 from osteon.errors import refuse
 
 if TYPE_CHECKING:
     from osteon._dask import DaskWorkers
     from osteon._ray import RayWorkers
 
-__all__ = ["WorkerStatus", "dask", "ray"]
+__all__ = ["dask", "ray"]
 
 PATIENCE_S = 30.0
 """Time that workers have to attach."""
@@ -52,6 +51,7 @@ def dask(
         ProgramError: a Dask worker lacks the package, or has another version.
     """
     from osteon._dask import DaskWorkers
+    from osteon._worker_process import WorkerPlan
 
     check(threads, patience)
     return DaskWorkers(client, WorkerPlan.here(coordinator, credentials), threads, patience)
@@ -83,6 +83,7 @@ def ray(
         ProgramError: a node lacks the package, or has another version.
     """
     from osteon._ray import RayWorkers
+    from osteon._worker_process import WorkerPlan
 
     check(threads, patience)
     return RayWorkers(WorkerPlan.here(coordinator, credentials), workers, threads, patience)

@@ -55,8 +55,9 @@ impl PyJob {
 
     /// The job as an encoded message `osteon.v1.JobSpecification`.
     fn to_message<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let message =
-            errors::computed(py, || specification::to_message(&self.specification).encode_to_vec())?;
+        let message = errors::computed(py, || {
+            specification::to_message(&self.specification).encode_to_vec()
+        })?;
         Ok(PyBytes::new(py, &message))
     }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import subprocess
@@ -46,9 +47,10 @@ class Octave(TestCase):
         self.assertIn(result.digest, printed)
         for name, group in result.groups.items():
             estimate = group.estimates["longitudinal_young_modulus"]
-            assert estimate.interval is not None
-            value, (low, high) = 1e-9 * estimate.value, (1e-9 * end for end in estimate.interval)
-            self.assertIn(f"{name}: {value:.2f} GPa, 95 % within {low:.2f} to {high:.2f}", printed)
+            # The table of groups leaves out what has no interval.
+            numbers = [estimate.value, *estimate.interval] if estimate.interval else [math.nan] * 3
+            value, low, high = (f"{1e-9 * number:.2f}".replace("nan", "NaN") for number in numbers)
+            self.assertIn(f"{name}: {value} GPa, 95 % within {low} to {high}", printed)
 
     def test_numbers_are_the_same_to_the_bit(self) -> None:
         scratch = self.scratch()
@@ -57,9 +59,9 @@ class Octave(TestCase):
         script = """
         found = load('result.mat');
         assert(isstruct(found.result));
-        assert(isempty(found.result.reason));
-        fprintf('%s\\n', class(found.realizations.velocity), num2hex(found.realizations.velocity)');
-        """.replace("num2hex(found.realizations.velocity)'", "cellstr(num2hex(found.realizations.velocity)){:}")
+        velocity = found.realizations.velocity;
+        fprintf('%s\\n', class(velocity), cellstr(num2hex(velocity)){:});
+        """
         kind, *lines = self.run_octave(script, scratch).split()
         self.assertEqual(kind, "double")
         velocities = result.table("realizations")["velocity"]

@@ -25,7 +25,7 @@ class Package(TestCase):
         script = "import sys, osteon; print('\\n'.join(sys.modules))"
         loaded = subprocess.run([sys.executable, "-c", script], check=True, stdout=subprocess.PIPE, text=True)
         modules = set(loaded.stdout.split())
-        for name in ("pandas", "polars", "xarray", "scipy", "arviz_base", "asyncio", "IPython"):
+        for name in ("pandas", "polars", "xarray", "scipy", "arviz_base", "asyncio", "IPython", "grpc", "distributed", "ray", "importlib.metadata"):
             self.assertNotIn(name, modules)
 
     def test_a_missing_program_is_an_exception(self) -> None:
@@ -55,6 +55,9 @@ class Package(TestCase):
         os.chdir(ROOT)
         tried = 0
         for module in pkgutil.iter_modules(osteon.__path__):
+            if module.name in ("_dask", "_ray"):
+                # They import packages that are not installed here; they have no examples.
+                continue
             found = importlib.import_module(f"osteon.{module.name}")
             tried += self.doctest(found)
         tried += self.doctest(osteon)

@@ -19,7 +19,7 @@ SMALL = {
     "identification": {"realizations": 64},
     "paper-figures": {"realizations": 800},
     "sensitivity": {"samples": 32},
-    "posterior": {"realizations": 32, "steps": 30, "burn_in": 10, "draws_of_job": 300},
+    "posterior": {"realizations": 32, "steps": 30, "burn_in": 10, "draws_of_job": 250},
 }
 """Values of the cell of parameters."""
 

@@ -26,7 +26,7 @@ SMALL = osteon.Job(
 )
 """A search of a second."""
 
-BIG = osteon.Job(parameters=OPTIMUM, monte_carlo={"realizations": 30_000, "seed": 7})
+BIG = osteon.Job(parameters=OPTIMUM, monte_carlo={"realizations": 10_000, "seed": 7})
 """A propagation that takes long enough to be disturbed."""
 
 DIGESTS: dict[str, str] = {}
