@@ -35,6 +35,8 @@ pub(crate) struct Arguments {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Write a first job file for a CSV file of velocities, and say what was understood of it
+    Init(InitArguments),
     /// Find the mean elasticity and dispersion that reproduce the measured velocities
     Identify(RunArguments),
     /// Evaluate the model at the given parameter values (no search)
@@ -360,6 +362,18 @@ pub(crate) struct TokenArguments {
     /// Append the entry to this token list (the coordinator's --tokens file) instead of printing it
     #[arg(long, value_name = "FILE")]
     pub(crate) tokens: Option<PathBuf>,
+}
+
+/// Arguments of `init`.
+#[derive(Debug, Args)]
+pub(crate) struct InitArguments {
+    /// CSV file with a header and a velocity in each row, in any of the usual formats; if omitted, the
+    /// job file has a placeholder for it
+    #[arg(value_name = "CSV")]
+    pub(crate) velocities: Option<PathBuf>,
+    /// New job file, or - to print it [default: the CSV file's name with .toml, or job.toml]
+    #[arg(long, short = 'o', value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// Arguments of `schema`.

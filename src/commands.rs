@@ -4,6 +4,7 @@ mod certs;
 mod check;
 mod coordinator;
 mod draw;
+mod init;
 mod jobs;
 mod materials;
 mod observe;
@@ -48,6 +49,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
         }
         Resolved::Certs(arguments) => certs::make(&arguments),
         Resolved::Token(arguments) => token::make(&arguments),
+        Resolved::Init(arguments) => init::write(&arguments),
         Resolved::Schema(arguments) => schema::print(&arguments),
         Resolved::Materials(arguments) => materials::print(&arguments),
         Resolved::Submit { job, kind, request, options, coordinator, format } => {

@@ -10,6 +10,7 @@
 pub mod case_file;
 pub mod document;
 pub mod file_error;
+pub mod init;
 pub mod job_file;
 pub mod materials;
 pub mod posterior_csv;

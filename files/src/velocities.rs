@@ -26,8 +26,9 @@ use self::columns::{Columns, CsvLine, Row};
 use self::problem::{Problem, shortened};
 use self::text_lines::LineReader;
 
-pub(crate) use self::columns::NamedColumns;
+pub(crate) use self::columns::{NamedColumns, is_like_subject, is_like_velocity};
 pub(crate) use self::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
+pub(crate) use self::fields::csv_fields;
 
 /// Maximum number of bad lines that are reported individually.
 const REPORTED_MAX: usize = 10;

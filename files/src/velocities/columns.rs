@@ -4,7 +4,7 @@ use osteon_common::check::{DECAY, VELOCITY};
 use osteon_common::parameters::Parameter;
 
 use super::csv_format::{CsvFormat, DecimalMark, Separator};
-use super::fields::fields;
+use super::fields::csv_fields;
 use super::problem::{COLUMN, CsvHint, Problem, listed, shortened};
 
 /// Names of columns that seem to name the subject of each velocity.
@@ -88,7 +88,7 @@ impl Columns {
         format: &CsvFormat,
     ) -> Result<Self, Problem> {
         let separator = format.separator.or(above).unwrap_or_default();
-        let names = fields(header, separator.character())?;
+        let names = csv_fields(header, separator.character())?;
         let velocity = format.column.as_deref().unwrap_or(COLUMN);
         if !names.iter().any(|name| name == velocity)
             && names.iter().all(|name| format.decimal.number(name).is_some())
@@ -113,8 +113,7 @@ impl Columns {
         let subject = column(named.subject, "subject")?;
         let decay = column(named.decay, "decay")?;
         let is_like = |name: &&String| {
-            LIKE_SUBJECTS.contains(&name.to_lowercase().as_str())
-                && !named.group.contains(&name.as_str())
+            is_like_subject(&name.to_lowercase()) && !named.group.contains(&name.as_str())
         };
         let like = names.iter().find(is_like).filter(|_| subject.is_none());
         // A column that is there twice is none.
@@ -130,7 +129,7 @@ impl Columns {
 
     /// Returns the fields of a line that are used.
     pub(super) fn row(&self, line: &str) -> Result<CsvLine, Problem> {
-        let mut fields = fields(line, self.separator)?;
+        let mut fields = csv_fields(line, self.separator)?;
         if fields.len() > 1 && fields.iter().all(String::is_empty) {
             return Ok(CsvLine::Blank);
         }
@@ -297,8 +296,13 @@ impl Header<'_> {
     }
 }
 
+/// Returns whether a column seems to name subjects, given its name in lower case.
+pub(crate) fn is_like_subject(name: &str) -> bool {
+    LIKE_SUBJECTS.contains(&name)
+}
+
 /// Returns whether a column seems to be one of velocities.
-pub(super) fn is_like_velocity(name: &str) -> bool {
+pub(crate) fn is_like_velocity(name: &str) -> bool {
     let name = name.to_lowercase();
     LIKE_VELOCITY.iter().any(|part| name.contains(part))
 }

@@ -70,7 +70,7 @@ impl Separator {
     }
 
     /// Returns the separator that a line `sep=…` names, which spreadsheets write above the header.
-    pub(super) fn of_first_line(line: &str) -> Option<Self> {
+    pub(crate) fn of_first_line(line: &str) -> Option<Self> {
         let mut named = line.trim_matches([' ', '"', '\r']).strip_prefix("sep=")?.chars();
         let (character, None) = (named.next()?, named.next()) else { return None };
         Self::ALL.into_iter().find(|separator| separator.character() == character)

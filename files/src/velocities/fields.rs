@@ -3,7 +3,7 @@
 use super::problem::Problem;
 
 /// Returns the fields of one line, without surrounding space and quotes.
-pub(super) fn fields(line: &str, separator: char) -> Result<Vec<String>, Problem> {
+pub(crate) fn csv_fields(line: &str, separator: char) -> Result<Vec<String>, Problem> {
     let is_space = |c: char| c.is_whitespace() && c != separator;
     let mut fields = Vec::new();
     let mut rest = line;

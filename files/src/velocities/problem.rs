@@ -15,7 +15,7 @@ const SHOWN_CHARACTERS_MAX: usize = 60;
 
 /// How to read a file that is not written as expected, at the end of a message.
 #[derive(Debug)]
-pub(super) enum CsvHint {
+pub(crate) enum CsvHint {
     None,
     Separator(Separator),
     Column(String),
@@ -51,7 +51,7 @@ impl fmt::Display for CsvHint {
 
 /// A fault. Its message completes a sentence that begins with the file or the line.
 #[derive(Debug, Error)]
-pub(super) enum Problem {
+pub(crate) enum Problem {
     #[error("cannot be read: {0} (its path is relative to the job file)")]
     Unreadable(io::Error),
     #[error("is longer than {} bytes", limits::FILE_BYTES_MAX)]
