@@ -86,6 +86,26 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(python::test),
     ),
     (
+        "pools",
+        "tests workers inside of a real Dask and a real Ray; takes names of tests",
+        Action::Function(python::pools),
+    ),
+    (
+        "notebooks",
+        "executes examples/notebooks with small sizes; takes names of tests",
+        Action::Function(python::notebooks),
+    ),
+    (
+        "stubs",
+        "makes the messages and stubs of the Python package from the .proto files",
+        Action::Function(python::stubs),
+    ),
+    (
+        "wheels",
+        "builds manylinux wheels: x86_64 and aarch64, or those named",
+        Action::Function(python::wheels),
+    ),
+    (
         "deny",
         "licences, versions, sources and advisories of the crates that osteon is built from",
         Action::Function(deny::check),
@@ -155,6 +175,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         "bench-fleet",
         "measures jobs on fleets of simulated workers; --help lists the options",
         Action::Function(fleet::bench),
+    ),
+    (
+        "bench-python",
+        "measures what Python adds to the time of velocities: --rounds N (20)",
+        Action::Function(python::bench),
     ),
     (
         "bench-peers",
