@@ -210,7 +210,7 @@ fn run_in(scratch: &Scratch, command: &str) {
 const GUIDES: [(&str, usize); 10] = [
     ("docs/quick-start.md", 5),
     ("docs/tutorial.md", 3),
-    ("docs/how-to-csv.md", 2),
+    ("docs/how-to-csv.md", 3),
     ("docs/how-to-observables.md", 2),
     ("docs/how-to-attenuation.md", 3),
     ("docs/how-to-cluster.md", 2),

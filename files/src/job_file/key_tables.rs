@@ -55,6 +55,8 @@ fn table(rows: &str) -> String {
 }
 
 fn row(path: &str, default: &str, allowed: &str, meaning: &str) -> String {
+    // A bar ends a cell, within code, too.
+    let meaning = meaning.replace('|', "\\|");
     format!("| `{path}` | {default} | {allowed} | {meaning} |\n")
 }
 
