@@ -184,7 +184,9 @@ def await_attached(
             return
         if time.monotonic() > deadline:
             count = f"{len(waiting)} of {len(found)}" if found else "the"
-            said = f"; one said: {waiting[0].message}" if waiting and waiting[0].message else ""
+            # The last ones are those that have no place to run.
+            messages = [status.message for status in reversed(waiting) if status.message]
+            said = f"; one said: {messages[0]}" if messages else ""
             raise CoordinatorError(
                 f"{count} workers have not attached to the coordinator at {coordinator} within "
                 f"{patience:g} s{said}. Is it running, and can the cluster reach this address?"
