@@ -7,6 +7,8 @@ use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::parameters::Parameter;
 use serde_json::{Map, Value as Json, json};
 
+use crate::materials;
+
 use super::csv_format::MISSING_MAX;
 use super::data_section::GROUP_COLUMNS_MAX;
 use super::{data_section, parameters, posterior, priors};
@@ -167,7 +169,13 @@ fn each_parameter(schema: fn(Parameter) -> Json) -> Json {
 
 fn ranges() -> Json {
     let mut ranges = object(each_parameter(range));
-    ranges["required"] = Parameter::OF_BONE.map(Parameter::name).to_vec().into();
+    let material = described(json!({ "enum": materials::NAMES }), parameters::MATERIAL);
+    ranges["properties"][parameters::MATERIAL.name] = material;
+    ranges["required"] = json!([Parameter::Dispersion.name()]);
+    ranges["anyOf"] = json!([
+        { "required": [parameters::MATERIAL.name] },
+        { "required": Parameter::OF_BONE.map(Parameter::name) },
+    ]);
     ranges
 }
 
@@ -187,8 +195,8 @@ fn range(parameter: Parameter) -> Json {
         range["required"] = json!([bounds.0]);
         range
     } else {
-        let required =
-            [json!({ "required": [start.0, bounds.0] }), json!({ "required": [fixed.0] })];
+        // With a material, `bounds` alone are enough.
+        let required = [json!({ "required": [bounds.0] }), json!({ "required": [fixed.0] })];
         let mut range = object(json!({ start.0: start.1, bounds.0: bounds.1, fixed.0: fixed.1 }));
         range["oneOf"] = required.to_vec().into();
         range
