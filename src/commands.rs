@@ -7,6 +7,7 @@ mod draw;
 mod jobs;
 mod observe;
 mod operators;
+mod report;
 mod run;
 mod scaling;
 mod schema;
@@ -37,6 +38,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
             unless_interrupted(check::check(arguments, isa, cores), NOTHING_LEFT).await
         }
         Resolved::Draw(arguments) => draw::draw(&arguments),
+        Resolved::Report(arguments) => report::report(&arguments),
         Resolved::Observe { arguments, isa, threads } => {
             let left = "no file was written";
             unless_interrupted(observe::observe(arguments, isa, threads), left).await
