@@ -46,6 +46,15 @@ pub(crate) fn digits(value: f64, digits: i32) -> String {
     }
 }
 
+/// Returns a given number with at most six significant digits, without zeros at its end.
+pub(crate) fn given(value: f64) -> String {
+    let text = digits(value, 6);
+    if text.contains('.') && !text.contains('·') {
+        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    }
+    text
+}
+
 /// Returns numbers at equal distances `step`, all with the decimals of the step; with powers of ten
 /// where they would be long.
 pub(crate) fn with_equal_decimals(values: &[f64], step: f64) -> Vec<String> {
@@ -136,6 +145,9 @@ mod tests {
             (f64::NAN, 3, "–"),
         ] {
             assert_eq!(digits(value, count), expected, "{value}, {count}");
+        }
+        for (value, expected) in [(12.0, "12"), (0.3816, "0.3816"), (1500.0, "1500"), (0.0, "0")] {
+            assert_eq!(given(value), expected);
         }
     }
 }

@@ -38,6 +38,8 @@ pub(crate) enum Precision {
     Free,
     /// This many.
     Digits(i32),
+    /// Those of a number that was given, without zeros at its end.
+    Given,
 }
 
 impl Unit {
@@ -52,6 +54,7 @@ impl Unit {
             Precision::Unknown => number::digits(value, DIGITS),
             Precision::Free => number::digits(value, FREE_DIGITS),
             Precision::Digits(digits) => number::digits(value, digits),
+            Precision::Given => number::given(value),
         }
     }
 

@@ -16,6 +16,8 @@ const WIDTH: f64 = 480.0;
 const PLOT_HEIGHT: f64 = 210.0;
 /// Width of an average character of labels.
 const CHARACTER: f64 = 6.6;
+/// Width of an average character of the legend, whose font is larger.
+const KEY_CHARACTER: f64 = 7.3;
 /// Height of a line of text.
 const LINE: f64 = 17.0;
 /// Most characters of a category's name.
@@ -190,7 +192,7 @@ fn legend(layers: &[Layer]) -> Vec<Vec<(f64, &Layer)>> {
     let mut rows: Vec<Vec<(f64, &Layer)>> = Vec::new();
     let mut free = f64::INFINITY;
     for layer in layers.iter().filter(|layer| !layer.name.is_empty()) {
-        let width = 30.0 + layer.name.chars().count() as f64 * CHARACTER + 12.0;
+        let width = 30.0 + layer.name.chars().count() as f64 * KEY_CHARACTER + 14.0;
         if free + width > WIDTH {
             rows.push(Vec::new());
             free = 2.0;

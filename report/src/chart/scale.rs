@@ -98,7 +98,8 @@ impl Scale {
 
     fn linear_ticks(&self, count: usize) -> Vec<Tick> {
         let step = round_step((self.high - self.low) / count.max(1) as f64);
-        let (first, last) = ((self.low / step).ceil(), (self.high / step).floor());
+        // The ends may miss a multiple of the step by rounding.
+        let (first, last) = ((self.low / step - 1e-6).ceil(), (self.high / step + 1e-6).floor());
         let number = (last - first).clamp(0.0, 100.0) as u32;
         let values: Vec<f64> = (0..=number).map(|n| (first + f64::from(n)) * step).collect();
         let labels = number::with_equal_decimals(&values, step);

@@ -93,7 +93,7 @@ fn figure(
     if !without.is_empty() {
         chart.layer("no interval known", Ink::Second, Shape::Points(without));
         reading.push_str(
-            " A value without an interval is one of many that match the data, or the model misses them.",
+            " Without an interval nothing is known of how far a value may be off: the data are too few, leave directions open, or are missed by the model.",
         );
     }
     if left_out > 0 {

@@ -31,34 +31,42 @@ fn record(
     let places: Vec<f64> = result.receivers.iter().map(|one| one.x1 / LENGTH.size).collect();
     let pitch = places.windows(2).map(|two| (two[1] - two[0]).abs()).fold(f64::INFINITY, f64::min);
     let pitch = if pitch.is_finite() { pitch } else { 1.0 };
-    let picked = result.receivers.iter().filter_map(|one| one.time);
-    // A few periods behind the last pick: the guided waves that follow are far larger.
+    let picked = || result.receivers.iter().filter_map(|one| one.time);
+    // The guided waves that follow are far larger than the first packet.
     let period = 1.0 / context.case.setup.probe.center_frequency;
-    let end = picked.fold(0.0_f64, f64::max) + 2.0 * period;
-    let shown = if end > 2.0 * period { end } else { f64::INFINITY };
-    let last = times.iter().take_while(|time| **time <= shown).count();
-    let largest = traces
-        .iter()
-        .map(|trace| trace.iter().take(last).fold(0.0_f64, |most, one| most.max(one.abs())))
-        .fold(0.0, f64::max);
+    let (first, last) = picked()
+        .fold((f64::INFINITY, 0.0_f64), |(first, last), time| (first.min(time), last.max(time)));
+    let shown = if first <= last {
+        [(first - 2.0 * period).max(0.0), last + 1.5 * period]
+    } else {
+        [0.0, f64::INFINITY]
+    };
+    let from = times.partition_point(|time| *time < shown[0]);
+    let to = times.partition_point(|time| *time <= shown[1]);
     let x = Axis::linear(TIME.after("time"));
     let y = Axis::linear(LENGTH.after("receiver’s x₁, with its pressure"));
     let mut chart = Chart::new("traces", "Pressures at the receivers, and picked times", x, y);
     chart.height = 1.6;
     chart.description = format!("{} receivers.", traces.len());
-    let scale = if largest > 0.0 { FILL * pitch / largest } else { 0.0 };
     let at = |trace: &[f64], time: f64| {
         let after = times.partition_point(|one| *one < time).min(times.len().saturating_sub(1));
         trace.get(after).copied().unwrap_or(0.0)
     };
     let (mut picks, mut thresholds) = (Vec::new(), Vec::new());
     for ((trace, place), receiver) in traces.iter().zip(&places).zip(&result.receivers) {
-        let points = thinned(&times[..last.min(trace.len())], trace);
-        let line = points.into_iter().map(|[time, one]| [time / TIME.size, place + one * scale]);
+        let own = match receiver.time {
+            Some(time) => largest_around(times, trace, time, period),
+            None => trace.iter().fold(0.0_f64, |most, one| most.max(one.abs())),
+        };
+        let scale = if own > 0.0 { FILL * pitch / own } else { 0.0 };
+        let to = to.min(trace.len());
+        let points = thinned(&times[from.min(to)..to], &trace[from.min(to)..to]);
+        let height = |one: f64| place + (one * scale).clamp(-pitch, pitch);
+        let line = points.into_iter().map(|[time, one]| [time / TIME.size, height(one)]);
         chart.layer("", Ink::First, Shape::Line(line.collect()));
         if let Some(time) = receiver.time {
-            picks.push([time / TIME.size, place + at(trace, time) * scale]);
-            let level = result.picking.threshold * largest_around(times, trace, time, period);
+            picks.push([time / TIME.size, height(at(trace, time))]);
+            let level = result.picking.threshold * own;
             let (from, to) = ((time - period) / TIME.size, (time + period) / TIME.size);
             thresholds.extend([1.0, -1.0].map(|sign| [from, to, place + sign * level * scale]));
         }
@@ -66,9 +74,10 @@ fn record(
     chart.layer("threshold", Ink::Muted, Shape::Intervals(thresholds));
     chart.layer("picked time", Ink::Second, Shape::Points(picks));
     let reading = format!(
-        "Each line is the pressure at one receiver, all to one scale, from the exact method. The marks \
-         are the picked {} extremum of the first packet; the short lines beside each mark are the \
-         threshold, {} of the largest pressure within a period of it.",
+        "Each line is the pressure at one receiver from the exact method, scaled so that the largest \
+         pressure within a period of the pick has the same height everywhere, and cut where it is \
+         larger later. The marks are the picked {} extremum of the first packet; the short lines around \
+         each are {} of that height, the share which the criterion asks for.",
         result.picking.extremum.name(),
         result.picking.threshold
     );

@@ -133,7 +133,7 @@ fn parameter_row(numbers: &Numbers, finding: &Finding<'_>, parameter: Parameter)
     let (value, place) = finding.value(parameter);
     let (lower, upper) = match finding.range(parameter) {
         Range::Fixed(_) => {
-            let shown = numbers.number(value, &place, unit, Precision::Unknown);
+            let shown = numbers.number(value, &place, unit, Precision::Given);
             let what = match finding.status {
                 Some(_) => "fixed by the job",
                 None => "given by the job",
@@ -142,10 +142,10 @@ fn parameter_row(numbers: &Numbers, finding: &Finding<'_>, parameter: Parameter)
         }
         Range::Free { lower, upper, .. } => (lower, upper),
     };
-    let bound = |value: f64| unit.show(value, Precision::Digits(4));
+    let bound = |value: f64| unit.show(value, Precision::Given);
     let bounds = format!("{} to {}", bound(lower), bound(upper));
     if finding.status.is_none() {
-        let shown = numbers.number(value, &place, unit, Precision::Unknown);
+        let shown = numbers.number(value, &place, unit, Precision::Given);
         return vec![heading, shown, none(), bounds, "start value of the job".to_owned()];
     }
     if let Some(one) = finding.posterior.and_then(|found| found.parameters.get(&parameter)) {

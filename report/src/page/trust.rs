@@ -61,11 +61,14 @@ fn of_groups(findings: &[Finding<'_>]) -> String {
     let worst =
         |finding: &Finding<'_>| of_finding(finding).iter().map(|one| one.bearing as u8).max();
     let without_doubt = findings.iter().filter(|one| worst(one) == Some(0)).count();
-    let sentence = format!(
-        "Of {} groups, {without_doubt} give no reason for doubt; what there is for the others stands \
-         below.",
-        findings.len()
-    );
+    let sentence = if without_doubt == findings.len() {
+        format!("Nothing found here speaks against the results of the {without_doubt} groups.")
+    } else {
+        format!(
+            "Of {} groups, {without_doubt} give no reason for doubt; look first at what stands below.",
+            findings.len()
+        )
+    };
     out.push_str(&format!("<p class=\"trust\">{sentence}</p>"));
     for finding in findings {
         let doubts: Vec<Verdict> =
@@ -123,6 +126,7 @@ fn of_finding(finding: &Finding<'_>) -> Vec<Verdict> {
     found.extend(starts(finding));
     found.push(failures(finding));
     found.extend(data(finding));
+    found.extend(few(finding));
     found.extend(solver(finding));
     found
 }
@@ -248,6 +252,18 @@ fn data(finding: &Finding<'_>) -> Option<Verdict> {
          nothing was left out because of it. Check them."
     );
     Some(verdict(Bearing::Caution, "Outliers", words))
+}
+
+/// Finds that there is no interval although the data determine every parameter.
+fn few(finding: &Finding<'_>) -> Option<Verdict> {
+    let identified = finding.identified?;
+    let known = finding.posterior.is_some() || identified.bulk_velocity.ends().is_some();
+    if known || !identified.matched || !identified.free_directions.is_empty() {
+        return None;
+    }
+    let words = "There are no intervals: fewer than five velocities or subjects, or moments without \
+                 their number.";
+    Some(verdict(Bearing::Caution, "Number of data", words))
 }
 
 fn solver(finding: &Finding<'_>) -> Option<Verdict> {
