@@ -10,6 +10,7 @@ mod peers;
 mod python;
 mod random;
 mod reference;
+mod report;
 mod slurm;
 mod tables;
 
@@ -117,6 +118,11 @@ const TASKS: &[(&str, &str, Action)] = &[
             &["deploy"],
             &["slurm", slurm::IF_INSTALLED],
         ]),
+    ),
+    (
+        "report",
+        "looks at reports in Chromium with the network off: rules of axe, script errors, widths",
+        Action::Function(report::check),
     ),
     (
         "slurm",

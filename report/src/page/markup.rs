@@ -59,7 +59,7 @@ pub(super) fn none() -> String {
 /// Returns a table; the first field of each row is its heading. Fields are HTML.
 pub(super) fn table(caption: &str, columns: &[&str], rows: &[Vec<String>]) -> String {
     let mut out = format!(
-        "<div class=\"table\" tabindex=\"0\" role=\"region\" aria-label=\"{0}\"><table><caption>{0}\
+        "<div class=\"table\" tabindex=\"0\" role=\"group\" aria-label=\"{0}\"><table><caption>{0}\
          </caption><thead><tr>",
         escaped(caption)
     );
