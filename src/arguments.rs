@@ -5,6 +5,7 @@ mod operators;
 mod realizations;
 mod services;
 mod slurm;
+mod umbridge;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -22,6 +23,7 @@ pub(crate) use slurm::{
     AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
     WorkerArrayArguments,
 };
+pub(crate) use umbridge::UmbridgeArguments;
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
@@ -47,6 +49,8 @@ pub(crate) enum Command {
     Draw(DrawArguments),
     /// Compute all observables of a job's realizations: velocities, decay, frequency
     Observe(ObserveArguments),
+    /// Serve a job's model to samplers and other programs by the UM-Bridge protocol, until interrupted
+    Umbridge(UmbridgeArguments),
     /// Run a coordinator: accept jobs from clients and distribute them to workers, until interrupted
     Coordinator(CoordinatorArguments),
     /// Run a worker: compute realizations for a coordinator, until interrupted
