@@ -288,8 +288,12 @@ fn a_coordinator_computes_for_many_clients() {
         "name": "forward", "input": [[1.0; 7]], "config": {"realizations": 10_000_000}
     });
     let body = body.to_string();
-    write!(stream, "POST /Evaluate HTTP/1.1\r\nHost: x\r\nContent-Length: {}\r\n\r\n{body}", body.len())
-        .unwrap();
+    write!(
+        stream,
+        "POST /Evaluate HTTP/1.1\r\nHost: x\r\nContent-Length: {}\r\n\r\n{body}",
+        body.len()
+    )
+    .unwrap();
     let jobs = |state: &str| {
         let jobs = coordinator.client(&["jobs", "--json"]).json();
         jobs.as_array().unwrap().iter().filter(|job| job.to_string().contains(state)).count()

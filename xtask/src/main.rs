@@ -12,6 +12,7 @@ mod random;
 mod reference;
 mod slurm;
 mod tables;
+mod umbridge;
 
 use std::env;
 use std::io::{self, Write as _};
@@ -85,6 +86,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(python::test),
     ),
     (
+        "umbridge",
+        "tests `osteon umbridge` by the conformity suite and the clients of UM-Bridge",
+        Action::Function(umbridge::test),
+    ),
+    (
         "deny",
         "licences, versions, sources and advisories of the crates that osteon is built from",
         Action::Function(deny::check),
@@ -106,7 +112,8 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "ci",
-        "what CI runs: lint, deny, every test, tracing, metrics, Python, deploy, Slurm if installed",
+        "what CI runs: lint, deny, every test, tracing, metrics, Python, UM-Bridge, deploy, Slurm if \
+         installed",
         Action::Commands(&[
             &["lint"],
             &["deny"],
@@ -114,6 +121,7 @@ const TASKS: &[(&str, &str, Action)] = &[
             &["tracing"],
             &["metrics"],
             &["python"],
+            &["umbridge"],
             &["deploy"],
             &["slurm", slurm::IF_INSTALLED],
         ]),
