@@ -6,6 +6,7 @@ mod realizations;
 mod report;
 mod services;
 mod slurm;
+mod umbridge;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -24,6 +25,7 @@ pub(crate) use slurm::{
     AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
     WorkerArrayArguments,
 };
+pub(crate) use umbridge::UmbridgeArguments;
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
@@ -53,6 +55,8 @@ pub(crate) enum Command {
     Observe(ObserveArguments),
     /// Write a report of results: a page for a browser, figures as SVG, their numbers as CSV
     Report(ReportArguments),
+    /// Serve a job's model to samplers and other programs by the UM-Bridge protocol, until interrupted
+    Umbridge(UmbridgeArguments),
     /// Run a coordinator: accept jobs from clients and distribute them to workers, until interrupted
     Coordinator(CoordinatorArguments),
     /// Run a worker: compute realizations for a coordinator, until interrupted

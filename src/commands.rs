@@ -16,6 +16,7 @@ mod schema;
 mod simulate;
 mod slurm;
 mod token;
+mod umbridge;
 mod worker;
 
 use crate::exit_status::{CommandFailure, ExitStatus};
@@ -45,6 +46,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
             let left = "no file was written";
             unless_interrupted(observe::observe(arguments, isa, threads), left).await
         }
+        Resolved::Umbridge(service) => umbridge::serve(*service).await,
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
         Resolved::Worker { config, files, unused, .. } => {
             worker::serve(config, &files, &unused).await

@@ -45,12 +45,13 @@ pub(crate) struct Embedded {
 
 impl Embedded {
     /// Starts coordinator and workers. `progress` increases whenever the workers have completed
-    /// something.
+    /// something; ended jobs are deleted after `keep_ended`, if it is given.
     pub(crate) async fn start(
         store: StoreLocation,
         workers: u32,
         threads: u32,
         progress: Arc<AtomicU64>,
+        keep_ended: Option<Duration>,
     ) -> Result<Self, CommandFailure> {
         let directory = private_directory().map_err(CommandFailure::Failed)?;
         let socket = directory.path().join("socket");
@@ -58,7 +59,7 @@ impl Embedded {
         let executable = std::env::current_exe()
             .context("cannot find this program to start workers")
             .map_err(CommandFailure::Failed)?;
-        let coordinator = start_coordinator(store, socket).await?;
+        let coordinator = start_coordinator(store, socket, keep_ended).await?;
         let workers = Workers::start(executable, &endpoint, workers, threads, progress);
         Ok(Self { coordinator, workers, endpoint, _directory: directory })
     }
@@ -89,6 +90,7 @@ impl Embedded {
 async fn start_coordinator(
     store: StoreLocation,
     socket: PathBuf,
+    keep_ended: Option<Duration>,
 ) -> Result<Coordinator, CommandFailure> {
     let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
     let listener = listener.map_err(CommandFailure::failed)?.with_spans(telemetry::recorder());
@@ -101,7 +103,8 @@ async fn start_coordinator(
         }
     };
     let store_give_up_after = Some(Duration::from_secs(STORE_PATIENCE_S));
-    let config = Config { store_give_up_after, commit: program::COMMIT, ..Config::default() };
+    let config =
+        Config { store_give_up_after, keep_ended, commit: program::COMMIT, ..Config::default() };
     osteon_coordinator::start(listener, store, config).await.map_err(CommandFailure::failed)
 }
 

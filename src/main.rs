@@ -34,6 +34,7 @@ mod signals;
 mod simulation_directory;
 mod slurm;
 mod telemetry;
+mod umbridge;
 mod unsearched_groups;
 mod warnings;
 

@@ -1,6 +1,7 @@
 //! The command line with environment and defaults resolved; files have not been read yet.
 
 mod slurm;
+mod umbridge;
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -8,6 +9,7 @@ use std::time::Duration;
 use anyhow::anyhow;
 use osteon_common::job::JobKind;
 use osteon_proto::credentials::{CredentialFiles, Credentials};
+use osteon_proto::endpoint::Endpoint;
 use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
@@ -25,6 +27,7 @@ use crate::request_id::RequestId;
 use crate::slurm::job_script::JobScript;
 
 pub(crate) use slurm::{ScalingPlan, WorkerArray};
+pub(crate) use umbridge::ModelService;
 
 /// Default number of worker processes of a run on this machine.
 const WORKERS_DEFAULT: u32 = 2;
@@ -77,6 +80,8 @@ pub(crate) enum Resolved {
         /// Number of threads.
         threads: u32,
     },
+    /// `umbridge`.
+    Umbridge(Box<ModelService>),
     /// `coordinator`.
     Coordinator(CoordinatorArguments),
     /// `worker`.
@@ -281,6 +286,10 @@ impl Resolved {
                 let threads = arguments.threads.unwrap_or(cores);
                 Self::Observe { arguments, isa: isa()?, threads }
             }
+            Command::Umbridge(arguments) => {
+                let service = umbridge::service(arguments, &environment, cores, isa()?)?;
+                Self::Umbridge(Box::new(service))
+            }
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
             Command::Worker(arguments) => resolve_worker(arguments, &environment, cores, isa()?)?,
             Command::Certs(arguments) => Self::Certs(arguments),
@@ -366,27 +375,8 @@ fn resolve_run(
         progress,
     } = arguments;
     let files = CredentialFiles::from(credentials);
-    let local = workers.is_some() || threads.is_some();
-    let from_environment = coordinator.is_none();
-    let endpoint = match coordinator {
-        None if !local => environment.coordinator()?,
-        given => given,
-    };
-    let location = match (endpoint, files.first_given()) {
-        (Some(endpoint), _) => {
-            let (files, unused) = environment.files(files, &endpoint);
-            RunLocation::Coordinator(Remote { endpoint, files, from_environment, unused })
-        }
-        (None, Some(option)) => {
-            return Err(CommandFailure::bad_input(anyhow!(
-                "{option} requires a coordinator; add --coordinator URL"
-            )));
-        }
-        (None, None) => {
-            let workers = workers.unwrap_or(WORKERS_DEFAULT);
-            RunLocation::Local { workers, threads: threads.unwrap_or((cores / workers).max(1)) }
-        }
-    };
+    let location =
+        Locating { workers, threads, coordinator, files }.location(cores, environment)?;
     Ok(Run {
         kind,
         job,
@@ -397,6 +387,45 @@ fn resolve_run(
         format: format(json),
         progress,
     })
+}
+
+/// The options that say where a job is computed.
+struct Locating {
+    workers: Option<u32>,
+    threads: Option<u32>,
+    coordinator: Option<Endpoint>,
+    files: CredentialFiles,
+}
+
+impl Locating {
+    fn location(
+        self,
+        cores: u32,
+        environment: &Environment,
+    ) -> Result<RunLocation, CommandFailure> {
+        let Self { workers, threads, coordinator, files } = self;
+        let local = workers.is_some() || threads.is_some();
+        let from_environment = coordinator.is_none();
+        let endpoint = match coordinator {
+            None if !local => environment.coordinator()?,
+            given => given,
+        };
+        match (endpoint, files.first_given()) {
+            (Some(endpoint), _) => {
+                let (files, unused) = environment.files(files, &endpoint);
+                let remote = Remote { endpoint, files, from_environment, unused };
+                Ok(RunLocation::Coordinator(remote))
+            }
+            (None, Some(option)) => Err(CommandFailure::bad_input(anyhow!(
+                "{option} requires a coordinator; add --coordinator URL"
+            ))),
+            (None, None) => {
+                let workers = workers.unwrap_or(WORKERS_DEFAULT);
+                let threads = threads.unwrap_or((cores / workers).max(1));
+                Ok(RunLocation::Local { workers, threads })
+            }
+        }
+    }
 }
 
 /// Resolves `jobs` and its subcommands.

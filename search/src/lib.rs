@@ -18,4 +18,5 @@ pub mod simplex;
 
 pub use expected::ExpectedEvaluations;
 pub use identify::{CompletedJob, IdentifyError, Realizations, identify};
+pub use posterior::PosteriorDensity;
 pub use search::{Assessment, Branch, Ending, ReplayError, Search, Step, Summary, same_point};

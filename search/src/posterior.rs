@@ -21,6 +21,7 @@
 
 mod check;
 mod cholesky;
+mod density;
 mod features;
 mod moments_grid;
 mod pareto;
@@ -39,6 +40,7 @@ use osteon_common::posterior::Posterior;
 use osteon_common::results::{BestPoint, Evaluation, Moments};
 
 use self::check::{BatchCheck, Doubt};
+pub use self::density::PosteriorDensity;
 use self::features::features;
 pub(crate) use self::population::closed_form;
 use self::population::{Member, Population, PosteriorProblem};

@@ -123,8 +123,8 @@ pub struct Assessment {
     set: u32,
     outcomes: Outcomes,
     statistics: PointStatistics,
-    /// `None` for a propagation.
-    cost: Option<f64>,
+    /// Cost, infinite at an infeasible point; `None` for a propagation.
+    pub cost: Option<f64>,
 }
 
 impl Search {
@@ -228,8 +228,8 @@ impl Search {
         self.history.push(row);
     }
 
-    /// Computes moments and cost of the pending point from its outcomes.
-    fn assess(&self, point: &Point, outcomes: &Outcomes) -> Assessment {
+    /// Computes moments and cost of any point, for the set of data that is searched, from its outcomes.
+    pub fn assess(&self, point: &Point, outcomes: &Outcomes) -> Assessment {
         let statistics = PointStatistics::new(&self.specification.monte_carlo, point, outcomes);
         let cost = match &self.plan {
             SearchPlan::Identification(identification) => {

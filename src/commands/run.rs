@@ -169,7 +169,8 @@ async fn run_locally(
     let store = directory
         .map_or(StoreLocation::Memory, |directory| StoreLocation::Directory(directory.store()));
     let progress = Arc::new(AtomicU64::new(0));
-    let mut embedded = Embedded::start(store, workers, threads, Arc::clone(&progress)).await?;
+    let mut embedded =
+        Embedded::start(store, workers, threads, Arc::clone(&progress), None).await?;
     let endpoint = embedded.endpoint().clone();
     let (files, unused) = (CredentialFiles::default(), Unused::default());
     let remote = Remote { endpoint, files, from_environment: false, unused };

@@ -14,6 +14,7 @@ mod reference;
 mod report;
 mod slurm;
 mod tables;
+mod umbridge;
 
 use std::env;
 use std::io::{self, Write as _};
@@ -107,6 +108,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(python::wheels),
     ),
     (
+        "umbridge",
+        "tests `osteon umbridge` by the conformity suite and the clients of UM-Bridge",
+        Action::Function(umbridge::test),
+    ),
+    (
         "deny",
         "licences, versions, sources and advisories of the crates that osteon is built from",
         Action::Function(deny::check),
@@ -128,7 +134,8 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "ci",
-        "what CI runs: lint, deny, every test, tracing, metrics, book, Python, deploy, Slurm if installed",
+        "what CI runs: lint, deny, every test, tracing, metrics, book, Python, UM-Bridge, deploy, Slurm \
+         if installed",
         Action::Commands(&[
             &["lint"],
             &["deny"],
@@ -137,6 +144,7 @@ const TASKS: &[(&str, &str, Action)] = &[
             &["metrics"],
             &["book"],
             &["python"],
+            &["umbridge"],
             &["deploy"],
             &["slurm", slurm::IF_INSTALLED],
         ]),

@@ -97,7 +97,7 @@ fn is_of_package(word: &str) -> bool {
 }
 
 /// Returns the command that runs a script.
-fn python(script: &str) -> Command {
+pub(crate) fn python(script: &str) -> Command {
     let interpreter = env::var_os("PYTHON").unwrap_or_else(|| OsString::from("python3"));
     let mut command = Command::new(interpreter);
     command.current_dir(root()).arg(script);

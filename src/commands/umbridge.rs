@@ -1,0 +1,99 @@
+//! `umbridge`: serves the models of a job to clients of UM-Bridge until it is asked to end.
+
+use std::future::pending;
+use std::pin::pin;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::time::Duration;
+
+use anyhow::anyhow;
+use osteon_common::job::JobKind;
+use osteon_common::visible;
+use osteon_files::job_file::{self, FilePurpose};
+use osteon_proto::credentials::CredentialFiles;
+
+use crate::client::{Client, Remote};
+use crate::embedded::{Embedded, StoreLocation};
+use crate::environment::Unused;
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
+use crate::output;
+use crate::progress::say;
+use crate::resolved::{ModelService, OutputFormat, RunLocation};
+use crate::signals;
+use crate::umbridge::{Evaluator, ModelListener, ServedJob, router};
+use crate::warnings;
+
+/// Time that an embedded coordinator keeps evaluated points: long enough to be fetched.
+const KEPT: Duration = Duration::from_secs(60);
+
+/// Serves until SIGINT or SIGTERM, or until the workers cannot continue. The URL is printed.
+pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFailure> {
+    let ModelService { job, address, location, isa } = service;
+    let kind = match job_file::purpose(&job).map_err(CommandFailure::bad_input)? {
+        FilePurpose::Job(kind) => kind,
+        FilePurpose::Case => {
+            return Err(CommandFailure::bad_input(anyhow!(
+                "{} is a case file, which describes one bone, and no job",
+                visible::path(&job)
+            )));
+        }
+    };
+    let noted = job_file::read_with_warnings(&job, kind).map_err(CommandFailure::bad_input)?;
+    warnings::say_of_job(&noted.specification, &noted.warnings).await;
+    if kind == JobKind::Propagation {
+        say("the job has no [data]: there is no model \"posterior\"");
+    }
+    let mut interruption = pin!(signals::interruption()?);
+    let listener = ModelListener::bind(address).await.map_err(CommandFailure::failed)?;
+    let evaluated = Arc::new(AtomicU64::new(0));
+    let mut embedded = None;
+    let remote = match location {
+        RunLocation::Coordinator(remote) => {
+            remote.announce();
+            remote
+        }
+        RunLocation::Local { workers, threads } => {
+            let (store, kept) = (StoreLocation::Memory, Some(KEPT));
+            let progress = Arc::clone(&evaluated);
+            let started = Embedded::start(store, workers, threads, progress, kept).await?;
+            let (files, unused) = (CredentialFiles::default(), Unused::default());
+            let endpoint = started.endpoint().clone();
+            embedded = Some(started);
+            Remote { endpoint, files, from_environment: false, unused }
+        }
+    };
+    let served = async {
+        let client = Client::connect(&remote).await?;
+        let evaluator = Evaluator::new(client, evaluated);
+        let models = Arc::new(ServedJob::new(noted.specification, evaluator.clone(), isa));
+        say(&format!("serving {}; Ctrl-C ends it", models.models().join(", ")));
+        let url = format!("{}\n", listener.url());
+        output::stdout(OutputFormat::Text).verbatim(&url).map_err(stdout_failure)?;
+        Ok::<_, CommandFailure>((router(models), evaluator))
+    };
+    let ended = async {
+        let (router, evaluator) = served.await?;
+        tokio::select! {
+            () = listener.serve(router) => {}
+            _ = interruption.as_mut() => {}
+        }
+        evaluator.end().await;
+        Ok(ExitStatus::Done)
+    };
+    let ended = tokio::select! {
+        ended = ended => ended,
+        failure = failed(&mut embedded) => Err(failure),
+    };
+    if let Some(embedded) = embedded {
+        embedded.end().await;
+    }
+    ended
+}
+
+/// Completes when embedded workers or their coordinator cannot continue; never, if there are none.
+async fn failed(embedded: &mut Option<Embedded>) -> CommandFailure {
+    match embedded {
+        Some(embedded) => embedded.failed().await,
+        None => pending().await,
+    }
+}

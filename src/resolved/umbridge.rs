@@ -1,0 +1,80 @@
+//! `umbridge`, with environment and defaults resolved.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use osteon_proto::credentials::CredentialFiles;
+use osteon_solver::Isa;
+
+use crate::arguments::UmbridgeArguments;
+use crate::environment::Environment;
+use crate::exit_status::CommandFailure;
+
+use super::{Locating, RunLocation};
+
+/// The protocol's usual port.
+const PORT_DEFAULT: u16 = 4242;
+/// The variable by which load balancers choose the port.
+const PORT_VARIABLE: &str = "PORT";
+
+/// A server of a job's models.
+#[derive(Debug)]
+pub(crate) struct ModelService {
+    /// The job file.
+    pub(crate) job: PathBuf,
+    /// Address to listen on.
+    pub(crate) address: SocketAddr,
+    /// Where points are evaluated.
+    pub(crate) location: RunLocation,
+    /// The instruction set to compute single cases on.
+    pub(crate) isa: Isa,
+}
+
+/// Resolves the arguments.
+pub(super) fn service(
+    arguments: UmbridgeArguments,
+    environment: &Environment,
+    cores: u32,
+    isa: Isa,
+) -> Result<ModelService, CommandFailure> {
+    let UmbridgeArguments { job, port, address, workers, threads, coordinator, credentials } =
+        arguments;
+    let port = match port {
+        Some(port) => port,
+        None => port_of(std::env::var(PORT_VARIABLE).ok())?,
+    };
+    let files = CredentialFiles::from(credentials);
+    let location =
+        Locating { workers, threads, coordinator, files }.location(cores, environment)?;
+    Ok(ModelService { job, address: SocketAddr::new(address, port), location, isa })
+}
+
+/// Returns the port that the environment names; an empty variable counts as unset.
+fn port_of(variable: Option<String>) -> Result<u16, CommandFailure> {
+    match variable.filter(|text| !text.is_empty()) {
+        None => Ok(PORT_DEFAULT),
+        Some(text) => text.parse().map_err(|_| {
+            CommandFailure::bad_input(anyhow!(
+                "in {PORT_VARIABLE}: {text:?} is not a port, which is a whole number from 0 to 65535"
+            ))
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_port_of_the_environment_is_a_port() {
+        let port = |text: Option<&str>| port_of(text.map(str::to_owned)).ok();
+        assert_eq!(port(None), Some(4242));
+        assert_eq!(port(Some("")), Some(4242));
+        assert_eq!(port(Some("0")), Some(0));
+        assert_eq!(port(Some("50051")), Some(50051));
+        for wrong in ["x", "65536", "-1", "80 "] {
+            assert_eq!(port(Some(wrong)), None, "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! A server of the UM-Bridge protocol, version 1.0: the model of a job as functions over HTTP, for
+//! samplers and other programs in any language.
+//!
+//! `listener` accepts connections, `routes` answers requests, `functions` knows what each model
+//! computes, and `evaluator` has its realizations computed by the workers of a coordinator.
+
+mod derivatives;
+mod deterministic;
+mod evaluator;
+mod functions;
+mod input_space;
+mod listener;
+mod model;
+mod protocol_error;
+mod request_config;
+mod request_fields;
+mod routes;
+
+pub(crate) use self::evaluator::Evaluator;
+pub(crate) use self::functions::ServedJob;
+pub(crate) use self::listener::ModelListener;
+pub(crate) use self::routes::router;
