@@ -23,7 +23,7 @@ use osteon_common::{limits, visible};
 use thiserror::Error;
 
 use self::columns::{Columns, CsvLine, Row};
-use self::problem::{Problem, shortened};
+use self::problem::{LocatedProblem, Problem, shortened};
 use self::text_lines::LineReader;
 
 pub(crate) use self::columns::{NamedColumns, is_like_subject, is_like_velocity};
@@ -85,8 +85,6 @@ pub(crate) fn read(
     }
     Ok(measured)
 }
-
-type LocatedProblem = (Option<usize>, Problem);
 
 fn parse(
     file: impl BufRead,

@@ -13,6 +13,9 @@ pub(super) const COLUMN: &str = "velocity";
 /// Maximum number of characters of a file's text that a message quotes.
 const SHOWN_CHARACTERS_MAX: usize = 60;
 
+/// A fault and its line, from 1.
+pub(super) type LocatedProblem = (Option<usize>, Problem);
+
 /// How to read a file that is not written as expected, at the end of a message.
 #[derive(Debug)]
 pub(crate) enum CsvHint {

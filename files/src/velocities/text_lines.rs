@@ -8,8 +8,7 @@ use encoding_rs::{Encoding, UTF_8};
 use encoding_rs_io::DecodeReaderBytesBuilder;
 use osteon_common::limits;
 
-use super::LocatedProblem;
-use super::problem::Problem;
+use super::problem::{LocatedProblem, Problem};
 use crate::file_error::without_byte_order_mark;
 use crate::user_file;
 
