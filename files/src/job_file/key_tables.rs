@@ -37,8 +37,9 @@ pub fn job_table() -> String {
     let mut settings = RunSettings::default();
     let declared = settings.sections().map(|(key, section)| rows(key.name, &entries(section)));
     table(&format!(
-        "{}{}{}{}{}{}{}{}",
+        "{}{}{}{}{}{}{}{}{}",
         special("data", &data_section::KEYS),
+        special("parameters", &[parameters::MATERIAL]),
         row("parameters.NAME", "", "", &each),
         special("parameters.NAME", &parameters::KEYS),
         declared.concat(),
@@ -54,6 +55,8 @@ fn table(rows: &str) -> String {
 }
 
 fn row(path: &str, default: &str, allowed: &str, meaning: &str) -> String {
+    // A bar ends a cell, within code, too.
+    let meaning = meaning.replace('|', "\\|");
     format!("| `{path}` | {default} | {allowed} | {meaning} |\n")
 }
 
