@@ -6,7 +6,7 @@ mod scale;
 use std::fmt::Write as _;
 
 pub(crate) use self::draw::STYLE;
-pub(crate) use self::scale::{Scale, Spacing};
+pub(crate) use self::scale::{AxisScale, Spacing};
 
 /// A chart with its texts.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +22,7 @@ pub(crate) struct Chart {
     /// The vertical axis.
     pub(crate) y: Axis,
     /// What is drawn, the last one on top.
-    pub(crate) layers: Vec<Layer>,
+    pub(crate) layers: Vec<ChartLayer>,
     /// Height relative to the usual one.
     pub(crate) height: f64,
     /// Whether a unit of both axes has the same length.
@@ -46,7 +46,7 @@ impl Chart {
 
     /// Adds a layer on top.
     pub(crate) fn layer(&mut self, name: impl Into<String>, ink: Ink, shape: Shape) {
-        self.layers.push(Layer { name: name.into(), ink, shape });
+        self.layers.push(ChartLayer { name: name.into(), ink, shape });
     }
 
     /// Returns the numbers of all layers: `x` to `x_end` and `y` to `y_end`, the ends empty where there
@@ -121,7 +121,7 @@ impl Axis {
 
 /// Something drawn, with its name in the legend.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Layer {
+pub(crate) struct ChartLayer {
     /// Name in the legend; empty for none.
     pub(crate) name: String,
     /// Colour, with a dash pattern or a marker of its own.

@@ -12,8 +12,8 @@ use osteon_files::report::{
     PosteriorReport, Propagation, Solutions, Solver, Velocity,
 };
 
-use crate::input::{JobContext, Outcomes};
-use crate::sample::Sample;
+use crate::input::{JobContext, ModelOutcomes};
+use crate::sample::VelocitySample;
 
 /// What was found from one set of data.
 #[derive(Debug)]
@@ -55,9 +55,9 @@ pub(crate) struct Finding<'a> {
     /// How the velocities were computed.
     pub(crate) solver: Option<&'a Solver<EstimatedErrors>>,
     /// The measured velocities.
-    pub(crate) measured: Option<Sample>,
+    pub(crate) measured: Option<VelocitySample>,
     /// The velocities of the model, and its failures.
-    pub(crate) model: Outcomes,
+    pub(crate) model: ModelOutcomes,
     /// The job and its tables.
     pub(crate) context: &'a JobContext,
 }
@@ -238,11 +238,11 @@ impl<'a> Finding<'a> {
     }
 }
 
-fn measured(context: &JobContext, set: usize) -> Option<Sample> {
+fn measured(context: &JobContext, set: usize) -> Option<VelocitySample> {
     let data = context.specification.data.as_ref()?;
-    Sample::new(data.velocities(set)?.to_vec())
+    VelocitySample::new(data.velocities(set)?.to_vec())
 }
 
-fn model(context: &JobContext, group: Option<&str>) -> Outcomes {
+fn model(context: &JobContext, group: Option<&str>) -> ModelOutcomes {
     context.realizations.as_ref().map(|all| all.of(group)).unwrap_or_default()
 }

@@ -4,8 +4,8 @@ use osteon_common::case::Case;
 use osteon_common::job::JobSpecification;
 use osteon_files::report::{Identification, Propagation, Simulation};
 
-use crate::sample::Sample;
-use crate::table::{Columns, TableError};
+use crate::sample::VelocitySample;
+use crate::table::{NumberTable, TableError};
 
 /// One run, as its directory holds it.
 #[derive(Debug)]
@@ -33,13 +33,13 @@ pub(crate) struct JobContext {
     /// The job.
     pub(crate) specification: Box<JobSpecification>,
     /// `history.csv`.
-    pub(crate) history: Option<Columns>,
+    pub(crate) history: Option<NumberTable>,
     /// `realizations.csv`.
-    pub(crate) realizations: Option<Realizations>,
+    pub(crate) realizations: Option<RealizationRows>,
     /// `posterior.csv`.
-    pub(crate) posterior: Option<Columns>,
+    pub(crate) posterior: Option<NumberTable>,
     /// `comparison.csv`.
-    pub(crate) comparison: Option<Columns>,
+    pub(crate) comparison: Option<NumberTable>,
 }
 
 /// The case of a simulation, and its traces.
@@ -66,7 +66,7 @@ pub struct JobTables {
 
 /// The rows of `realizations.csv`.
 #[derive(Debug)]
-pub(crate) struct Realizations {
+pub(crate) struct RealizationRows {
     /// Name of the group of each; empty strings without groups.
     groups: Vec<String>,
     /// Velocities, m/s, NaN for failures.
@@ -77,18 +77,18 @@ pub(crate) struct Realizations {
 
 /// One part of the realizations: those of a group, or all.
 #[derive(Debug, Default)]
-pub(crate) struct Outcomes {
+pub(crate) struct ModelOutcomes {
     /// The velocities.
-    pub(crate) velocities: Option<Sample>,
+    pub(crate) velocities: Option<VelocitySample>,
     /// Index and kind of each failure.
     pub(crate) failures: Vec<(f64, String)>,
     /// Number of all.
     pub(crate) count: usize,
 }
 
-impl Realizations {
+impl RealizationRows {
     fn read(text: &str) -> Result<Self, TableError> {
-        let table = Columns::read(text)?;
+        let table = NumberTable::read(text)?;
         let texts = |name: &str| -> Vec<String> {
             let found = table.texts(name).unwrap_or_else(|| vec![""; table.len()]);
             found.into_iter().map(str::to_owned).collect()
@@ -98,7 +98,7 @@ impl Realizations {
     }
 
     /// Returns the realizations of a group, or all of a run without groups.
-    pub(crate) fn of(&self, group: Option<&str>) -> Outcomes {
+    pub(crate) fn of(&self, group: Option<&str>) -> ModelOutcomes {
         let of_group = |place: &usize| {
             group.is_none_or(|name| self.groups.get(*place).is_some_and(|one| one == name))
         };
@@ -107,9 +107,11 @@ impl Realizations {
             let kind = self.failures.get(*place)?;
             (!kind.is_empty()).then(|| (index as f64, kind.clone()))
         });
-        Outcomes {
+        ModelOutcomes {
             failures: failures.collect(),
-            velocities: Sample::new(places.iter().map(|place| self.velocities[*place]).collect()),
+            velocities: VelocitySample::new(
+                places.iter().map(|place| self.velocities[*place]).collect(),
+            ),
             count: places.len(),
         }
     }
@@ -117,11 +119,11 @@ impl Realizations {
 
 impl JobContext {
     fn read(specification: JobSpecification, tables: &JobTables) -> Result<Self, TableError> {
-        let table = |text: &Option<String>| text.as_deref().map(Columns::read).transpose();
+        let table = |text: &Option<String>| text.as_deref().map(NumberTable::read).transpose();
         Ok(Self {
             specification: Box::new(specification),
             history: table(&tables.history)?,
-            realizations: tables.realizations.as_deref().map(Realizations::read).transpose()?,
+            realizations: tables.realizations.as_deref().map(RealizationRows::read).transpose()?,
             posterior: table(&tables.posterior)?,
             comparison: table(&tables.comparison)?,
         })
@@ -170,7 +172,7 @@ impl ReportedRun {
         let traces = match traces {
             None => None,
             Some(text) => {
-                let table = Columns::read(text)?;
+                let table = NumberTable::read(text)?;
                 let column = |name: &String| table.numbers(name).map(Option::unwrap_or_default);
                 let mut columns = table
                     .names()

@@ -5,9 +5,9 @@ const DECIMALS_MAX: i32 = 12;
 
 /// Number of decimals shown: 2 means hundredths, -1 means tens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Decimals(i32);
+pub(crate) struct RoundedPlaces(i32);
 
-impl Decimals {
+impl RoundedPlaces {
     /// Returns the decimals that show this many significant digits of `value`; `None` if it is 0, not
     /// finite, or smaller than any decimal that is shown.
     pub(crate) fn new(value: f64, digits: i32) -> Option<Self> {
@@ -36,7 +36,7 @@ impl Decimals {
 
 /// Returns a number with this many significant digits; with a power of ten where it would be long.
 pub(crate) fn digits(value: f64, digits: i32) -> String {
-    match Decimals::new(value, digits) {
+    match RoundedPlaces::new(value, digits) {
         Some(decimals) if (-4..=7).contains(&exponent(value, digits - 1)) => decimals.show(value),
         _ if value == 0.0 => "0".to_owned(),
         _ if value.is_finite() => {
@@ -59,9 +59,9 @@ pub(crate) fn given(value: f64) -> String {
 /// where they would be long.
 pub(crate) fn with_equal_decimals(values: &[f64], step: f64) -> Vec<String> {
     let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    let plain = Decimals::new(step, 1).filter(|_| step >= 1e-4 && largest < 1e6);
+    let plain = RoundedPlaces::new(step, 1).filter(|_| step >= 1e-4 && largest < 1e6);
     let label = |value: &f64| match plain {
-        Some(decimals) => Decimals(decimals.0.max(0)).show(*value),
+        Some(decimals) => RoundedPlaces(decimals.0.max(0)).show(*value),
         // The sum of steps is not exactly the decimal.
         None if value.abs() < step / 2.0 => "0".to_owned(),
         None => {
@@ -125,11 +125,11 @@ mod tests {
             (45_678.0, 1234.0, "45700"),
             (-0.001, 0.23, "0.00"),
         ] {
-            let decimals = Decimals::for_error(error).unwrap();
+            let decimals = RoundedPlaces::for_error(error).unwrap();
             assert_eq!(decimals.show(value), expected, "{value} ± {error}");
         }
         for error in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-30] {
-            assert_eq!(Decimals::for_error(error), None, "{error}");
+            assert_eq!(RoundedPlaces::for_error(error), None, "{error}");
         }
     }
 

@@ -15,7 +15,7 @@ use crate::figures::{self, Figure, FigureSection};
 use crate::finding::Finding;
 use crate::input::{ReportedRun, RunContent};
 use crate::page::markup::Numbers;
-use crate::sample::Sample;
+use crate::sample::VelocitySample;
 use crate::text::escaped;
 
 const PAGE_STYLE: &str = include_str!("page/page.css");
@@ -163,7 +163,7 @@ fn comparison(
         .flat_map(|(run, own)| own.iter().map(move |finding| (run, finding)))
         .map(|(run, finding)| (label(run, finding), run, finding))
         .collect();
-    let samples: Vec<(String, &Sample)> = all
+    let samples: Vec<(String, &VelocitySample)> = all
         .iter()
         .filter_map(|(name, _, finding)| Some((name.clone(), finding.model.velocities.as_ref()?)))
         .collect();

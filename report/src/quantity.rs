@@ -2,7 +2,7 @@
 
 use osteon_common::parameters::Parameter;
 
-use crate::number::{self, Decimals};
+use crate::number::{self, RoundedPlaces};
 
 /// Significant digits of a number whose error is unknown.
 const DIGITS: i32 = 5;
@@ -47,7 +47,7 @@ impl Unit {
     pub(crate) fn show(&self, value: f64, precision: Precision) -> String {
         let value = value / self.size;
         match precision {
-            Precision::Error(error) => match Decimals::for_error(error / self.size) {
+            Precision::Error(error) => match RoundedPlaces::for_error(error / self.size) {
                 Some(decimals) => decimals.show(value),
                 None => number::digits(value, DIGITS),
             },

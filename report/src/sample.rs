@@ -12,12 +12,12 @@ pub(crate) const NORMAL_95: f64 = 1.959_963_984_540_054;
 
 /// Velocities in ascending order, with those in the order of their indices beside them.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Sample {
+pub(crate) struct VelocitySample {
     in_order: Vec<f64>,
     sorted: Vec<f64>,
 }
 
-impl Sample {
+impl VelocitySample {
     /// Returns the velocities as a sample; `None` if there is none.
     pub(crate) fn new(velocities: Vec<f64>) -> Option<Self> {
         let mut sorted: Vec<f64> =
@@ -241,8 +241,8 @@ impl PowerSums {
 mod tests {
     use super::*;
 
-    fn sample(velocities: &[f64]) -> Sample {
-        Sample::new(velocities.to_vec()).unwrap()
+    fn sample(velocities: &[f64]) -> VelocitySample {
+        VelocitySample::new(velocities.to_vec()).unwrap()
     }
 
     #[test]
@@ -298,6 +298,6 @@ mod tests {
         assert!(sample.bandwidth() > 0.0 && sample.histogram().is_empty());
         assert!(sample.density().iter().all(|[_, height]| height.is_finite()));
         assert_eq!(sample.running(10)[0].variation, [0.0, 0.0]);
-        assert_eq!(Sample::new(vec![f64::NAN]), None);
+        assert_eq!(VelocitySample::new(vec![f64::NAN]), None);
     }
 }

@@ -14,12 +14,12 @@ pub struct TableError {
 
 /// Columns of a table, by their names.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Columns {
+pub(crate) struct NumberTable {
     names: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
-impl Columns {
+impl NumberTable {
     /// Reads a table.
     ///
     /// # Errors
@@ -132,7 +132,8 @@ mod tests {
 
     #[test]
     fn columns_are_found_by_name() {
-        let table = Columns::read("index,velocity,failure\n0,4000.5,\n1,,no_arrival\n").unwrap();
+        let table =
+            NumberTable::read("index,velocity,failure\n0,4000.5,\n1,,no_arrival\n").unwrap();
         let velocities = table.numbers("velocity").unwrap().unwrap();
         assert!(velocities[0] == 4000.5 && velocities[1].is_nan());
         assert_eq!(table.texts("failure").unwrap(), ["", "no_arrival"]);
@@ -144,9 +145,9 @@ mod tests {
         for (text, expected) in
             [("", "line 1: the file is empty"), ("a,b\n1,2\n3\n", "line 3: 1 fields instead of 2")]
         {
-            assert_eq!(Columns::read(text).unwrap_err().to_string(), expected);
+            assert_eq!(NumberTable::read(text).unwrap_err().to_string(), expected);
         }
-        let table = Columns::read("a\n1\nx\n").unwrap();
+        let table = NumberTable::read("a\n1\nx\n").unwrap();
         let error = table.numbers("a").unwrap_err();
         assert_eq!(error.to_string(), "line 3: a: \"x\" is not a number");
     }

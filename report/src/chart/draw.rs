@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use super::scale::Tick;
-use super::{Axis, Chart, Ink, Layer, Scale, Shape};
+use super::{Axis, AxisScale, Chart, ChartLayer, Ink, Shape};
 use crate::text::{escaped, shortened};
 
 /// Colours and strokes of charts, for a page that contains them and for files of their own.
@@ -29,8 +29,8 @@ struct Frame {
     top: f64,
     width: f64,
     height: f64,
-    x: Scale,
-    y: Scale,
+    x: AxisScale,
+    y: AxisScale,
     /// Whether the vertical axis grows downwards, as lists do.
     downwards: bool,
 }
@@ -120,15 +120,15 @@ impl Chart {
     }
 
     /// Returns the scales of both axes, which hold all layers unless their ends are given.
-    fn scales(&self) -> [Scale; 2] {
+    fn scales(&self) -> [AxisScale; 2] {
         let extents: Vec<[Vec<f64>; 2]> =
             self.layers.iter().map(|layer| layer.shape.extent()).collect();
         let bars = self.layers.iter().any(|layer| matches!(layer.shape, Shape::Bars(_)));
         let scale = |axis: &Axis, place: usize| match axis.range {
-            Some([low, high]) if low < high => Scale { spacing: axis.spacing, low, high },
+            Some([low, high]) if low < high => AxisScale { spacing: axis.spacing, low, high },
             _ => {
                 let values = extents.iter().flat_map(|extent| extent[place].iter().copied());
-                let mut found = Scale::around(values, axis.spacing, 0.04);
+                let mut found = AxisScale::around(values, axis.spacing, 0.04);
                 // Bars stand on the axis.
                 if bars && place == 1 && found.low < 0.0 && found.high > 0.0 {
                     found.low = 0.0;
@@ -162,7 +162,7 @@ impl Chart {
 }
 
 /// Returns the marks of an axis.
-fn labels_of(axis: &Axis, scale: &Scale, count: usize) -> Vec<Tick> {
+fn labels_of(axis: &Axis, scale: &AxisScale, count: usize) -> Vec<Tick> {
     if axis.categories.is_empty() {
         return scale.ticks(count);
     }
@@ -176,7 +176,7 @@ fn labels_of(axis: &Axis, scale: &Scale, count: usize) -> Vec<Tick> {
 /// Returns where the plot lies and what it spans, for a script that shows values under the pointer.
 fn plot_data(frame: &Frame) -> String {
     let [left, top, width, height] = [frame.left, frame.top, frame.width, frame.height].map(short);
-    let of = |scale: &Scale| {
+    let of = |scale: &AxisScale| {
         let spacing = match scale.spacing {
             super::Spacing::Linear => "linear",
             super::Spacing::Logarithmic => "log",
@@ -188,8 +188,8 @@ fn plot_data(frame: &Frame) -> String {
 }
 
 /// Returns the rows of the legend: entries with their horizontal positions.
-fn legend(layers: &[Layer]) -> Vec<Vec<(f64, &Layer)>> {
-    let mut rows: Vec<Vec<(f64, &Layer)>> = Vec::new();
+fn legend(layers: &[ChartLayer]) -> Vec<Vec<(f64, &ChartLayer)>> {
+    let mut rows: Vec<Vec<(f64, &ChartLayer)>> = Vec::new();
     let mut free = f64::INFINITY;
     for layer in layers.iter().filter(|layer| !layer.name.is_empty()) {
         let width = 30.0 + layer.name.chars().count() as f64 * KEY_CHARACTER + 14.0;
@@ -205,7 +205,7 @@ fn legend(layers: &[Layer]) -> Vec<Vec<(f64, &Layer)>> {
     rows
 }
 
-fn legend_row(out: &mut String, entries: &[(f64, &Layer)], y: f64) {
+fn legend_row(out: &mut String, entries: &[(f64, &ChartLayer)], y: f64) {
     for (x, layer) in entries {
         let (class, middle) = (class(layer.ink), y - 4.0);
         let [from, to, at] = [*x, *x + 22.0, middle].map(short);
@@ -228,7 +228,7 @@ fn legend_row(out: &mut String, entries: &[(f64, &Layer)], y: f64) {
     }
 }
 
-fn draw(out: &mut String, layer: &Layer, frame: &Frame) {
+fn draw(out: &mut String, layer: &ChartLayer, frame: &Frame) {
     let class = class(layer.ink);
     let _infallible = match &layer.shape {
         Shape::Line(points) => {
@@ -405,7 +405,7 @@ mod tests {
 
     #[test]
     fn lines_are_interrupted_where_there_is_no_value() {
-        let scale = |high| Scale { spacing: Spacing::Linear, low: 0.0, high };
+        let scale = |high| AxisScale { spacing: Spacing::Linear, low: 0.0, high };
         let (x, y) = (scale(10.0), scale(1.0));
         let frame =
             Frame { left: 0.0, top: 0.0, width: 100.0, height: 10.0, x, y, downwards: false };

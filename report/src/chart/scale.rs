@@ -1,6 +1,6 @@
 //! Scales of axes: positions of values, and ticks at round numbers.
 
-use crate::number::{self, Decimals};
+use crate::number::{self, RoundedPlaces};
 
 /// Most powers of ten that a logarithmic axis spans; what lies farther below the largest value is cut.
 const DECADES_MAX: f64 = 24.0;
@@ -16,7 +16,7 @@ pub(crate) enum Spacing {
 
 /// A scale: values from `low` to `high` fill an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Scale {
+pub(crate) struct AxisScale {
     /// How values become positions.
     pub(crate) spacing: Spacing,
     /// Smallest value.
@@ -34,7 +34,7 @@ pub(crate) struct Tick {
     pub(crate) label: String,
 }
 
-impl Scale {
+impl AxisScale {
     /// Returns the scale that holds these values with a margin of `margin` times their range at both
     /// ends. Values that are not finite, or not above 0 on a logarithmic scale, are ignored.
     pub(crate) fn around(
@@ -132,7 +132,7 @@ impl Scale {
         });
         let inside = values.filter(|value| (self.low..=self.high).contains(value));
         let label = |value: f64| {
-            Decimals::new(value, 1)
+            RoundedPlaces::new(value, 1)
                 .filter(|_| (1e-4..1e6).contains(&value))
                 .map_or_else(|| format!("{value:e}"), |decimals| decimals.show(value))
         };
@@ -155,7 +155,7 @@ fn round_step(step: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn labels(scale: Scale) -> Vec<String> {
+    fn labels(scale: AxisScale) -> Vec<String> {
         let ticks = scale.ticks(5).into_iter().map(|tick| tick.label);
         ticks.filter(|label| !label.is_empty()).collect()
     }
@@ -169,7 +169,7 @@ mod tests {
             (17.71, 17.74, vec!["17.71", "17.72", "17.73", "17.74"]),
             (0.0, 2e-6, vec!["0", "5e-7", "1e-6", "1.5e-6", "2e-6"]),
         ] {
-            let scale = Scale { spacing: Spacing::Linear, low, high };
+            let scale = AxisScale { spacing: Spacing::Linear, low, high };
             assert_eq!(labels(scale), expected, "{low} to {high}");
         }
     }
@@ -181,7 +181,7 @@ mod tests {
             (2.0, 30.0, vec!["2", "5", "10", "20"]),
             (1e-8, 1e-2, vec!["10⁻⁸", "10⁻⁶", "10⁻⁴", "0.01"]),
         ] {
-            let scale = Scale { spacing: Spacing::Logarithmic, low, high };
+            let scale = AxisScale { spacing: Spacing::Logarithmic, low, high };
             assert_eq!(labels(scale), expected, "{low} to {high}");
         }
     }
@@ -197,7 +197,7 @@ mod tests {
             (vec![1e-300, 1.0], Spacing::Logarithmic),
             (vec![4000.0, 4000.0], Spacing::Logarithmic),
         ] {
-            let scale = Scale::around(values.clone(), spacing, 0.04);
+            let scale = AxisScale::around(values.clone(), spacing, 0.04);
             assert!(scale.low < scale.high, "{values:?}: {scale:?}");
             assert_eq!(scale.position(scale.low), 0.0, "{values:?}");
             assert!((scale.position(scale.high) - 1.0).abs() < 1e-12, "{values:?}");

@@ -2,14 +2,14 @@
 
 use super::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
-use crate::sample::Sample;
+use crate::sample::VelocitySample;
 
 /// Most runs in one figure: there are as many colours.
 pub(crate) const OVERLAID_MAX: usize = 4;
 
 /// Returns the figures that lay the velocities of several runs over each other: name and velocities of
 /// each.
-pub(crate) fn overlay(runs: &[(String, &Sample)]) -> Vec<Figure> {
+pub(crate) fn overlay(runs: &[(String, &VelocitySample)]) -> Vec<Figure> {
     if runs.len() < 2 {
         return Vec::new();
     }

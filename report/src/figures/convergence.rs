@@ -8,14 +8,14 @@ use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::number::digits;
 use crate::quantity::{symbol, words};
-use crate::table::Columns;
+use crate::table::NumberTable;
 
 /// Most evaluations that are drawn: the lines of more are thinned.
 const ROWS_MAX: usize = 600;
 
 /// Returns the figures of the search, if its history is known.
 pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
-    let Some(rows) = Rows::of(finding) else { return Vec::new() };
+    let Some(rows) = SearchRows::of(finding) else { return Vec::new() };
     let mut figures = vec![cost(finding, &rows)];
     figures.extend(Moment::ALL.into_iter().filter_map(|moment| course(finding, moment, &rows)));
     figures.extend(parameters(finding, &rows));
@@ -23,12 +23,12 @@ pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
 }
 
 /// The rows of `history.csv` that belong to one set of data.
-struct Rows<'a> {
-    table: &'a Columns,
+struct SearchRows<'a> {
+    table: &'a NumberTable,
     places: Vec<usize>,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> SearchRows<'a> {
     fn of(finding: &'a Finding<'_>) -> Option<Self> {
         let table = finding.context.history.as_ref()?;
         let groups = table.texts("group");
@@ -64,7 +64,7 @@ impl<'a> Rows<'a> {
 
 const X: &str = "evaluation";
 
-fn cost(finding: &Finding<'_>, rows: &Rows<'_>) -> Figure {
+fn cost(finding: &Finding<'_>, rows: &SearchRows<'_>) -> Figure {
     let costs = rows.numbers("cost").unwrap_or_default();
     let mut lowest = f64::INFINITY;
     let best: Vec<f64> = costs
@@ -112,7 +112,7 @@ fn cost(finding: &Finding<'_>, rows: &Rows<'_>) -> Figure {
     Figure { chart, reading }
 }
 
-fn course(finding: &Finding<'_>, moment: Moment, rows: &Rows<'_>) -> Option<Figure> {
+fn course(finding: &Finding<'_>, moment: Moment, rows: &SearchRows<'_>) -> Option<Figure> {
     let (name, title, label) = match moment {
         Moment::Mean => ("mean", "Mean of each evaluation", "mean (m/s)"),
         Moment::CoefficientOfVariation => (
@@ -143,7 +143,7 @@ fn course(finding: &Finding<'_>, moment: Moment, rows: &Rows<'_>) -> Option<Figu
     Some(Figure { chart, reading: reading.to_owned() })
 }
 
-fn parameters(finding: &Finding<'_>, rows: &Rows<'_>) -> Option<Figure> {
+fn parameters(finding: &Finding<'_>, rows: &SearchRows<'_>) -> Option<Figure> {
     let free: Vec<Parameter> = finding.free();
     if free.is_empty() {
         return None;

@@ -10,7 +10,7 @@ pub(crate) const GROUPS_MAX: usize = 60;
 /// Returns the figures that compare the groups: what was identified, and what was measured.
 pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
     let shown = &findings[..findings.len().min(GROUPS_MAX)];
-    let identified = |finding: &Finding<'_>, dispersion: bool| -> Place {
+    let identified = |finding: &Finding<'_>, dispersion: bool| -> ForestRow {
         if let Some(posterior) = finding.posterior {
             let quantity = if dispersion {
                 posterior.parameters.get(&osteon_common::parameters::Parameter::Dispersion)
@@ -24,14 +24,14 @@ pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
             found.map(|found| if dispersion { &found.dispersion } else { &found.bulk_velocity });
         (quantity.and_then(|one| one.value), quantity.and_then(|one| one.ends()))
     };
-    let measured = |finding: &Finding<'_>, variation: bool| -> Place {
+    let measured = |finding: &Finding<'_>, variation: bool| -> ForestRow {
         let moment = osteon_files::report::Moment::ALL[usize::from(variation)];
         let data = finding.data;
         let ends = data.and_then(|data| data.intervals()).map(|both| both.get(moment));
         (data.and_then(|data| data.moments.get(moment)), ends)
     };
     let left_out = findings.len() - shown.len();
-    let all: [(&str, &str, &str, Vec<Place>); 4] = [
+    let all: [(&str, &str, &str, Vec<ForestRow>); 4] = [
         (
             "groups-bulk-velocity",
             "√(c₁₁₁₁/ρ) of each group",
@@ -64,13 +64,13 @@ pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
 }
 
 /// A value and its interval.
-type Place = (Option<f64>, Option<[f64; 2]>);
+type ForestRow = (Option<f64>, Option<[f64; 2]>);
 
 fn figure(
     findings: &[Finding<'_>],
     left_out: usize,
     [name, title, label]: [&str; 3],
-    places: &[Place],
+    places: &[ForestRow],
 ) -> Figure {
     let names = findings.iter().map(|one| one.group.unwrap_or_default().to_owned()).collect();
     let y = Axis::of_categories("", names);

@@ -6,7 +6,7 @@ use super::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::quantity::{symbol, unit, words};
-use crate::sample::Sample;
+use crate::sample::VelocitySample;
 
 /// Returns a figure for each free parameter.
 pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
@@ -23,7 +23,7 @@ fn figure(finding: &Finding<'_>, parameter: Parameter) -> Option<Figure> {
     let draws = values.iter().enumerate().filter(|(row, _)| {
         groups.as_ref().is_none_or(|groups| Some(groups[*row]) == finding.group)
     });
-    let draws = Sample::new(draws.map(|(_, value)| value / unit.size).collect())?;
+    let draws = VelocitySample::new(draws.map(|(_, value)| value / unit.size).collect())?;
     let label = unit.after(&format!("{} {}", words(parameter), symbol(parameter)));
     let file = format!("{}posterior-{}", finding.prefix(), parameter.name().replace('_', "-"));
     let title = format!("Posterior of the {}{}", words(parameter), finding.suffix());

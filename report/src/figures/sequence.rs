@@ -3,7 +3,7 @@
 use super::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
-use crate::sample::Sample;
+use crate::sample::VelocitySample;
 
 /// Most velocities that are drawn one by one.
 const DOTS_MAX: usize = 3000;
@@ -19,14 +19,14 @@ pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
     let model = finding.model.velocities.as_ref().map(|sample| {
         (sample, "realizations", "Realizations of the model in their order", Ink::First)
     });
-    let figure = |(sample, name, title, ink): (&Sample, &str, &str, Ink)| {
+    let figure = |(sample, name, title, ink): (&VelocitySample, &str, &str, Ink)| {
         let name = format!("{}{name}", finding.prefix());
         sequence(sample, name, format!("{title}{}", finding.suffix()), ink)
     };
     measured.into_iter().chain(model).map(figure).collect()
 }
 
-fn sequence(sample: &Sample, name: String, title: String, ink: Ink) -> Figure {
+fn sequence(sample: &VelocitySample, name: String, title: String, ink: Ink) -> Figure {
     let velocities = sample.in_order();
     let x = Axis::linear("index").from_to(0.0, velocities.len() as f64);
     let mut chart = Chart::new(name, title, x, Axis::linear("velocity (m/s)"));

@@ -4,7 +4,7 @@ use super::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::number::digits;
-use crate::sample::{NORMAL_95, Sample};
+use crate::sample::{NORMAL_95, VelocitySample};
 
 const MODEL: &str = "model";
 const MEASURED: &str = "measured";
@@ -12,8 +12,10 @@ const AXIS: &str = "velocity (m/s)";
 
 /// Returns the figures of the velocities.
 pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
-    let samples =
-        Samples { model: finding.model.velocities.as_ref(), measured: finding.measured.as_ref() };
+    let samples = ComparedSamples {
+        model: finding.model.velocities.as_ref(),
+        measured: finding.measured.as_ref(),
+    };
     if samples.model.is_none() && samples.measured.is_none() {
         return Vec::new();
     }
@@ -29,21 +31,21 @@ pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
 }
 
 /// Both samples, as far as they are known.
-struct Samples<'a> {
-    model: Option<&'a Sample>,
-    measured: Option<&'a Sample>,
+struct ComparedSamples<'a> {
+    model: Option<&'a VelocitySample>,
+    measured: Option<&'a VelocitySample>,
 }
 
-impl Samples<'_> {
+impl ComparedSamples<'_> {
     /// Returns which there are, with their names and colours.
-    fn named(&self) -> impl Iterator<Item = (&'static str, Ink, &Sample)> {
+    fn named(&self) -> impl Iterator<Item = (&'static str, Ink, &VelocitySample)> {
         let model = self.model.map(|sample| (MODEL, Ink::First, sample));
         model.into_iter().chain(self.measured.map(|sample| (MEASURED, Ink::Second, sample)))
     }
 
     /// Returns what both are, in words.
     fn described(&self) -> String {
-        let one = |(name, _, sample): (&str, Ink, &Sample)| {
+        let one = |(name, _, sample): (&str, Ink, &VelocitySample)| {
             let [low, high] = sample.range().map(|velocity| digits(velocity, 5));
             format!("{} {name} velocities from {low} to {high} m/s.", sample.len())
         };

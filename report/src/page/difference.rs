@@ -15,7 +15,7 @@ use crate::text::{escaped, shortened};
 const COLUMNS_MAX: usize = 8;
 
 /// A value with the ends of its interval, NaN where they are not known.
-type Estimated = [f64; 3];
+type EstimateWithEnds = [f64; 3];
 
 /// Returns the table of the differences from the first run: name, number of the run, finding.
 pub(super) fn table(all: &[(String, usize, &Finding<'_>)], runs: &[ReportedRun]) -> String {
@@ -59,20 +59,21 @@ fn of_findings(all: &[(String, usize, &Finding<'_>)]) -> String {
     let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
     let findings: Vec<&Finding<'_>> = all.iter().map(|(_, _, finding)| *finding).collect();
     let mut rows = Vec::new();
-    let mut add = |name: String, unit: Unit, of: &dyn Fn(&Finding<'_>) -> Option<Estimated>| {
-        let found: Vec<Option<Estimated>> = findings.iter().map(|one| of(one)).collect();
-        if found.iter().flatten().count() < 2 {
-            return;
-        }
-        let mut row = vec![escaped(&unit.after(&name))];
-        let first = found[0].unwrap_or([f64::NAN; 3]);
-        row.push(difference(first, unit).replace("<strong>", "").replace("</strong>", ""));
-        let minus_first = |one: &Option<Estimated>| {
-            difference(one.map_or([f64::NAN; 3], |one| minus(one, first)), unit)
+    let mut add =
+        |name: String, unit: Unit, of: &dyn Fn(&Finding<'_>) -> Option<EstimateWithEnds>| {
+            let found: Vec<Option<EstimateWithEnds>> = findings.iter().map(|one| of(one)).collect();
+            if found.iter().flatten().count() < 2 {
+                return;
+            }
+            let mut row = vec![escaped(&unit.after(&name))];
+            let first = found[0].unwrap_or([f64::NAN; 3]);
+            row.push(difference(first, unit).replace("<strong>", "").replace("</strong>", ""));
+            let minus_first = |one: &Option<EstimateWithEnds>| {
+                difference(one.map_or([f64::NAN; 3], |one| minus(one, first)), unit)
+            };
+            row.extend(found[1..].iter().map(minus_first));
+            rows.push(row);
         };
-        row.extend(found[1..].iter().map(minus_first));
-        rows.push(row);
-    };
     add("mean of the model".to_owned(), VELOCITY, &|one| model(one, Moment::Mean));
     add("coefficient of variation of the model".to_owned(), NUMBER, &|one| {
         model(one, Moment::CoefficientOfVariation)
@@ -97,25 +98,28 @@ fn of_findings(all: &[(String, usize, &Finding<'_>)]) -> String {
 
 /// Returns the difference of two independent quantities with its interval (G. Y. Zou, A. Donner, Stat.
 /// Med. 27 (2008)).
-fn minus([a, a_low, a_high]: Estimated, [b, b_low, b_high]: Estimated) -> Estimated {
+fn minus(
+    [a, a_low, a_high]: EstimateWithEnds,
+    [b, b_low, b_high]: EstimateWithEnds,
+) -> EstimateWithEnds {
     let [down, up] = [[a - a_low, b_high - b], [a_high - a, b - b_low]]
         .map(|[one, other]| libm::sqrt(one * one + other * other));
     [a - b, a - b - down, a - b + up]
 }
 
-fn model(finding: &Finding<'_>, moment: Moment) -> Option<Estimated> {
+fn model(finding: &Finding<'_>, moment: Moment) -> Option<EstimateWithEnds> {
     let value = finding.velocity.moments.get(moment)?;
     let half = NORMAL_95 * finding.velocity.standard_error.get(moment).unwrap_or(f64::NAN);
     Some([value, value - half, value + half])
 }
 
-fn data(finding: &Finding<'_>, moment: Moment) -> Option<Estimated> {
+fn data(finding: &Finding<'_>, moment: Moment) -> Option<EstimateWithEnds> {
     let data = finding.data?;
     let ends = data.intervals().map_or([f64::NAN; 2], |both| both.get(moment));
     Some([data.moments.get(moment)?, ends[0], ends[1]])
 }
 
-fn bulk_velocity(finding: &Finding<'_>) -> Option<Estimated> {
+fn bulk_velocity(finding: &Finding<'_>) -> Option<EstimateWithEnds> {
     if let Some(posterior) = finding.posterior {
         let [low, high] = posterior.bulk_velocity.ends()?;
         return Some([posterior.bulk_velocity.mean?, low, high]);
@@ -126,7 +130,7 @@ fn bulk_velocity(finding: &Finding<'_>) -> Option<Estimated> {
 }
 
 /// Returns a parameter that the data determine; `None` for one that they leave open, or that is fixed.
-fn determined(finding: &Finding<'_>, parameter: Parameter) -> Option<Estimated> {
+fn determined(finding: &Finding<'_>, parameter: Parameter) -> Option<EstimateWithEnds> {
     if let Some(posterior) = finding.posterior {
         let found = posterior.parameters.get(&parameter)?;
         let [low, high] = found.ends()?;

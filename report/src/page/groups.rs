@@ -4,7 +4,7 @@ use super::markup::{Numbers, none, width_precision};
 use crate::finding::Finding;
 use crate::input::JobContext;
 use crate::quantity::{NUMBER, Precision, Unit, VELOCITY};
-use crate::table::Columns;
+use crate::table::NumberTable;
 use crate::text::{escaped, shortened};
 
 /// Most groups of which all differences are shown.
@@ -113,7 +113,7 @@ pub(super) fn differences(context: &JobContext, findings: &[Finding<'_>]) -> Opt
 }
 
 /// Returns the rows of a matrix of differences; `None` if the table lacks the columns.
-fn matrix(table: &Columns, names: &[&str], key: &str, unit: Unit) -> Option<Vec<Vec<String>>> {
+fn matrix(table: &NumberTable, names: &[&str], key: &str, unit: Unit) -> Option<Vec<Vec<String>>> {
     let (first, second) = (table.texts("first")?, table.texts("second")?);
     let numbers = |name: String| table.numbers(&name).ok().flatten();
     let value = numbers(key.to_owned())?;
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn differences_are_read_in_both_directions() {
         let text = "first,second,d,d_lower,d_upper\na,b,10,4,16\n";
-        let table = Columns::read(text).unwrap();
+        let table = NumberTable::read(text).unwrap();
         let rows = matrix(&table, &["a", "b"], "d", VELOCITY).unwrap();
         assert_eq!(rows[0], ["a", &none(), "<strong>10.0 (4.0 to 16.0)</strong>"]);
         assert_eq!(rows[1], ["b", "<strong>-10.0 (-16.0 to -4.0)</strong>", &none()]);
