@@ -1,5 +1,6 @@
 //! The command line with environment and defaults resolved; files have not been read yet.
 
+mod client;
 mod slurm;
 mod umbridge;
 
@@ -297,39 +298,16 @@ impl Resolved {
             Command::Init(arguments) => Self::Init(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
             Command::Materials(arguments) => Self::Materials(arguments),
-            Command::Submit(arguments) => {
-                resolve_submit(remote(arguments.client.clone())?, arguments)?
-            }
-            Command::Jobs(arguments) => resolve_jobs(arguments, remote)?,
-            Command::Workers(arguments) => resolve_workers(arguments, remote)?,
+            Command::Submit(arguments) => client::submit(arguments, remote)?,
+            Command::Jobs(arguments) => client::jobs(arguments, remote)?,
+            Command::Workers(arguments) => client::workers(arguments, remote)?,
             Command::Slurm(arguments) => slurm::scripts(arguments, remote)?,
-            Command::Health(arguments) => Self::Health {
-                coordinator: remote(arguments.client)?,
-                limit: Duration::from_secs_f64(arguments.timeout),
-                format: format(arguments.json),
-            },
-            Command::Backup(arguments) => Self::Backup {
-                directory: arguments.directory,
-                coordinator: remote(arguments.client)?,
-                format: format(arguments.json),
-            },
-            Command::Watch(WatchArguments { job, json }) => {
-                let coordinator = remote(job.client)?;
-                Self::Watch { job: job.job, coordinator, format: format(json) }
-            }
-            Command::Explain(arguments) => Self::Explain {
-                job: arguments.job,
-                coordinator: remote(arguments.client)?,
-                format: format(arguments.json),
-            },
-            Command::Cancel(arguments) => {
-                Self::Cancel { job: arguments.job, coordinator: remote(arguments.client)? }
-            }
-            Command::Fetch(arguments) => Self::Fetch {
-                job: arguments.job,
-                coordinator: remote(arguments.client)?,
-                out: arguments.out,
-            },
+            Command::Health(arguments) => client::health(arguments, remote)?,
+            Command::Backup(arguments) => client::backup(arguments, remote)?,
+            Command::Watch(arguments) => client::watch(arguments, remote)?,
+            Command::Explain(arguments) => client::explain(arguments, remote)?,
+            Command::Cancel(arguments) => client::cancel(arguments, remote)?,
+            Command::Fetch(arguments) => client::fetch(arguments, remote)?,
         })
     }
 
@@ -428,43 +406,6 @@ impl Locating {
     }
 }
 
-/// Resolves `jobs` and its subcommands.
-fn resolve_jobs(
-    arguments: JobsArguments,
-    remote: impl Fn(ClientArguments) -> Result<Remote, CommandFailure>,
-) -> Result<Resolved, CommandFailure> {
-    let JobsArguments { command, client, json } = arguments;
-    Ok(match command {
-        None => Resolved::Jobs { coordinator: remote(client)?, format: format(json) },
-        Some(JobsCommand::Prune(prune)) => Resolved::Prune {
-            older_than: prune.older_than,
-            keep_last: prune.keep_last,
-            coordinator: remote(prune.client.or(client))?,
-            format: format(json || prune.json),
-        },
-    })
-}
-
-/// Resolves `workers` and its subcommands.
-fn resolve_workers(
-    arguments: WorkersArguments,
-    remote: impl Fn(ClientArguments) -> Result<Remote, CommandFailure>,
-) -> Result<Resolved, CommandFailure> {
-    let WorkersArguments { command, client, json } = arguments;
-    Ok(match command {
-        None => Resolved::Workers { coordinator: remote(client)?, format: format(json) },
-        Some(WorkersCommand::Drain(drain)) => Resolved::DrainWorker {
-            worker: drain.worker,
-            coordinator: remote(drain.client.or(client))?,
-            format: format(json || drain.json),
-        },
-        Some(WorkersCommand::Slurm(scaling)) => {
-            let coordinator = remote(scaling.client.clone().or(client))?;
-            slurm::scaling(*scaling, coordinator)?
-        }
-    })
-}
-
 fn resolve_worker(
     arguments: WorkerArguments,
     environment: &Environment,
@@ -491,23 +432,6 @@ impl From<CredentialArguments> for CredentialFiles {
         let CredentialArguments { tls_ca, tls_cert, tls_key, token_file } = arguments;
         Self { ca: tls_ca, certificate: tls_cert, key: tls_key, token: token_file }
     }
-}
-
-fn resolve_submit(
-    coordinator: Remote,
-    arguments: SubmitArguments,
-) -> Result<Resolved, CommandFailure> {
-    let SubmitArguments { job, client: _, propagate, request_id, name, priority, json } = arguments;
-    Ok(Resolved::Submit {
-        job,
-        kind: if propagate { JobKind::Propagation } else { JobKind::Identification },
-        request: request_id
-            .map_or_else(RequestId::new, |id| Ok(RequestId::with_id(id)))
-            .map_err(CommandFailure::failed)?,
-        options: SubmitOptions { priority, name: name.unwrap_or_default() },
-        coordinator,
-        format: format(json),
-    })
 }
 
 #[cfg(test)]

@@ -285,7 +285,7 @@ fn a_coordinator_computes_for_many_clients() {
     let mut stream = TcpStream::connect(&server.address).unwrap();
     stream.set_write_timeout(Some(Duration::from_secs(60))).unwrap();
     let body = json!({
-        "name": "forward", "input": [[1.0; 7]], "config": {"realizations": 10_000_000}
+        "name": "forward", "input": [[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]], "config": {"realizations": 10_000_000}
     });
     let body = body.to_string();
     write!(
