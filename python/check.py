@@ -1,5 +1,9 @@
 """Builds the wheel of the package osteon, installs it in a virtual environment, and tests it there: the
-tests, the types of the package, of its stubs and of its tests. Uses the standard library only."""
+tests, the types of the package, of its stubs and of its tests, and whether the messages that it ships are made
+from the .proto files. Uses the standard library only.
+
+Other suites need packages of their own: `pools` runs workers in Dask and Ray, `notebooks` executes
+examples/notebooks, and `bench` measures what Python adds."""
 
 import argparse
 import os
@@ -9,6 +13,12 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent
+SUITES = {"package": "tests", "pools": "tests/pools", "notebooks": "tests/notebooks", "bench": "bench"}
+"""Folders of the tests, or of the benchmark, each with the requirements of its environment."""
+
+MODULES = os.pathsep.join(str(HERE / folder) for folder in ("tests", "tests/pools"))
+"""Where mypy finds what several tests use."""
+
 sys.path.insert(0, str(ROOT / "tests" / "python"))
 
 from environment import check_version, make, run  # noqa: E402
@@ -19,17 +29,28 @@ def main():
     parser.add_argument("--work", required=True, type=pathlib.Path, help="where to build and install to")
     parser.add_argument("--profile", default="dev", help="profile of cargo (dev, release)")
     parser.add_argument("tests", nargs="*", help="names of tests; all, and the types, without any")
+    parser.add_argument("--suite", choices=SUITES, default="package", help="what to test (package)")
     arguments = parser.parse_args()
     check_version()
     arguments.work = arguments.work.absolute()
-    python = make(arguments.work / "venv", HERE / "tests" / "requirements.txt")
+    folder = HERE / SUITES[arguments.suite]
+    python = make(arguments.work / "venv", folder / "requirements.txt")
     install(python, arguments.work / "wheels", arguments.profile)
-    variables = dict(os.environ, PYTHONDONTWRITEBYTECODE="1", MYPYPATH=str(HERE / "tests"))
+    variables = dict(os.environ, PYTHONDONTWRITEBYTECODE="1", MYPYPATH=MODULES)
     variables.pop("OSTEON_COORDINATOR", None)
-    tests = arguments.tests or [path.stem for path in sorted((HERE / "tests").glob("test_*.py"))]
-    if not arguments.tests:
+    if arguments.suite == "bench":
+        run([python, HERE / "bench" / "compare.py", *arguments.tests], ROOT, variables)
+        return
+    tests = arguments.tests or [path.stem for path in sorted(folder.glob("test_*.py"))]
+    if arguments.suite == "package" and not arguments.tests:
+        run([sys.executable, HERE / "protos.py", "--check", "--environment", arguments.work / "venv"])
         types(python, variables, arguments.work)
-    run([python, "-W", "error::ResourceWarning", "-m", "unittest", "-v", *tests], HERE / "tests", variables)
+    run([python, *warnings(arguments.suite), "-m", "unittest", "-v", *tests], folder, variables)
+
+
+def warnings(suite):
+    """Options of Python: what is left open is an error, but not in packages of others."""
+    return ["-W", "error::ResourceWarning"] if suite == "package" else []
 
 
 def install(python, wheels, profile):
@@ -50,7 +71,7 @@ def types(python, variables, work):
     mypy = [python, "-m", "mypy", "--config-file", HERE / "pyproject.toml"]
     mypy += ["--cache-dir", work / "mypy"]
     run([*mypy, "--package", "osteon"], work, variables)
-    run([*mypy, *sorted((HERE / "tests").glob("*.py"))], work, variables)
+    run([*mypy, *sorted((HERE / "tests").rglob("*.py"))], work, variables)
     stubs = [python, "-m", "mypy.stubtest", "osteon._native", "--mypy-config-file"]
     run([*stubs, HERE / "pyproject.toml"], work, variables)
 

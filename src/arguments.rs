@@ -37,6 +37,8 @@ pub(crate) struct Arguments {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Write a first job file for a CSV file of velocities, and say what was understood of it
+    Init(InitArguments),
     /// Find the mean elasticity and dispersion that reproduce the measured velocities
     Identify(RunArguments),
     /// Evaluate the model at the given parameter values (no search)
@@ -82,6 +84,8 @@ pub(crate) enum Command {
     Certs(CertsArguments),
     /// Create an access token and its entry for the coordinator's token list
     Token(TokenArguments),
+    /// List published stiffness of cortical bone, which job and case files use by name
+    Materials(MaterialsArguments),
     /// Print the JSON Schema of a job file or of result.json
     Schema(SchemaArguments),
 }
@@ -364,12 +368,35 @@ pub(crate) struct TokenArguments {
     pub(crate) tokens: Option<PathBuf>,
 }
 
+/// Arguments of `init`.
+#[derive(Debug, Args)]
+pub(crate) struct InitArguments {
+    /// CSV file with a header and a velocity in each row, in any of the usual formats; if omitted, the
+    /// job file has a placeholder for it
+    #[arg(value_name = "CSV")]
+    pub(crate) velocities: Option<PathBuf>,
+    /// New job file, or - to print it [default: the CSV file's name with .toml, or job.toml]
+    #[arg(long, short = 'o', value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
 /// Arguments of `schema`.
 #[derive(Debug, Args)]
 pub(crate) struct SchemaArguments {
     /// `job`: job files; `result`: result.json and the output of a run with --json
     #[arg(value_enum, value_name = "FILE")]
     pub(crate) file: SchemaFile,
+}
+
+/// Arguments of `materials`.
+#[derive(Debug, Args)]
+pub(crate) struct MaterialsArguments {
+    /// Print values and reference of this material alone
+    #[arg(value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    /// Print values and references as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// A file that has a schema.

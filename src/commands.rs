@@ -4,7 +4,9 @@ mod certs;
 mod check;
 mod coordinator;
 mod draw;
+mod init;
 mod jobs;
+mod materials;
 mod observe;
 mod operators;
 mod run;
@@ -49,7 +51,9 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
         }
         Resolved::Certs(arguments) => certs::make(&arguments),
         Resolved::Token(arguments) => token::make(&arguments),
+        Resolved::Init(arguments) => init::write(&arguments),
         Resolved::Schema(arguments) => schema::print(&arguments),
+        Resolved::Materials(arguments) => materials::print(&arguments),
         Resolved::Submit { job, kind, request, options, coordinator, format } => {
             let submission = jobs::Submission { job: &job, kind, request: &request, options };
             let left = "the job may have been accepted (see `osteon jobs`)";

@@ -22,6 +22,8 @@ use crate::cost::JobCost;
 use crate::observations::ObservationSummary;
 use crate::resolved::OutputFormat;
 
+pub(crate) use self::text::wrapped;
+
 /// A result to show.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ShownResult<'a> {

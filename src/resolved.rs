@@ -15,9 +15,10 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
-    CredentialArguments, DrawArguments, JobsArguments, JobsCommand, LogFormat, ObserveArguments,
-    ProgressFormat, RunArguments, SchemaArguments, SimulateArguments, SubmitArguments,
-    TokenArguments, WatchArguments, WorkerArguments, WorkersArguments, WorkersCommand,
+    CredentialArguments, DrawArguments, InitArguments, JobsArguments, JobsCommand, LogFormat,
+    MaterialsArguments, ObserveArguments, ProgressFormat, RunArguments, SchemaArguments,
+    SimulateArguments, SubmitArguments, TokenArguments, WatchArguments, WorkerArguments,
+    WorkersArguments, WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
@@ -96,8 +97,12 @@ pub(crate) enum Resolved {
     Certs(CertsArguments),
     /// `token`.
     Token(TokenArguments),
+    /// `init`.
+    Init(InitArguments),
     /// Print a schema.
     Schema(SchemaArguments),
+    /// `materials`.
+    Materials(MaterialsArguments),
     /// `submit`.
     Submit {
         /// The job file.
@@ -284,7 +289,9 @@ impl Resolved {
             Command::Worker(arguments) => resolve_worker(arguments, &environment, cores, isa()?)?,
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
+            Command::Init(arguments) => Self::Init(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
+            Command::Materials(arguments) => Self::Materials(arguments),
             Command::Submit(arguments) => {
                 resolve_submit(remote(arguments.client.clone())?, arguments)?
             }

@@ -4,7 +4,9 @@
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
+use std::path::Path;
 use std::process::Command;
+use std::{env, fs};
 
 use osteon_common::version::{NUMERICS_REVISION, RESULT_SCHEMA};
 use support::run;
@@ -41,6 +43,40 @@ fn help_of_every_command() {
         assert!(line.chars().count() <= 80, "{line}");
     }
     insta::assert_snapshot!(text);
+}
+
+/// What docs/cli.md says before the commands.
+const PAGE_HEAD: &str = "\
+<!-- Written by `cargo xtask reference`; do not edit. -->
+
+# Command line
+
+Each command prints this with `--help`. Results go to stdout, everything else to stderr. Exit codes: 0 if the run has
+ended with a result, 1 if it failed or was cancelled, 2 on bad usage or bad input, 130 or 143 after Ctrl-C or SIGTERM.
+";
+
+#[test]
+fn the_page_of_commands_is_that_of_the_program() {
+    let (mut text, mut count) = (String::new(), 0);
+    help(&[], &mut text, &mut count);
+    let mut page = format!("{PAGE_HEAD}\n## `osteon`\n\n```text\n");
+    for line in text.lines() {
+        match line.strip_prefix("==== ") {
+            Some(command) => {
+                page.truncate(page.trim_end().len());
+                page += &format!("\n```\n\n## `{command}`\n\n```text\n");
+            }
+            None => page += &format!("{line}\n"),
+        }
+    }
+    page.truncate(page.trim_end().len());
+    page += "\n```\n";
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/cli.md");
+    if env::var_os("OSTEON_WRITE_DOCS").is_some() {
+        fs::write(&path, &page).unwrap();
+    }
+    let committed = fs::read_to_string(&path).unwrap_or_default();
+    assert!(committed == page, "docs/cli.md is stale; `cargo xtask reference` writes it");
 }
 
 #[test]

@@ -6,6 +6,7 @@
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -59,20 +60,7 @@ fn the_readmes_commands_do_what_they_say() {
         if all[i + 1..].iter().any(|later| later.starts_with(command.as_str())) {
             continue;
         }
-        let (arguments, file) = match command.split_once(" > ") {
-            Some((arguments, file)) => (arguments, Some(file)),
-            None => (command.as_str(), None),
-        };
-        let output = osteon()
-            .args(arguments.split_whitespace())
-            .current_dir(scratch.path("."))
-            .output()
-            .unwrap();
-        let errors = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "osteon {command}: {errors}");
-        if let Some(file) = file {
-            fs::write(scratch.path(file), &output.stdout).unwrap();
-        }
+        run_in(&scratch, command);
     }
     // The example data match the description in their header. (A better solver may change them by
     // its accuracy.)
@@ -193,6 +181,93 @@ fn the_grpc_pages_code_is_the_tested_clients() {
     }
 }
 
+/// Writes the files that a page shows: each a fenced block after a comment `file: NAME`.
+fn write_files(page: &str, scratch: &Scratch) {
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
+    for part in text.split("<!-- file: ").skip(1) {
+        let (name, rest) = part.split_once(" -->\n```").unwrap();
+        let (_, block) = rest.split_once('\n').unwrap();
+        scratch.write(name, block.split("```").next().unwrap());
+    }
+}
+
+/// Runs a command in a shell's way, as far as the pages need it: `> FILE`.
+fn run_in(scratch: &Scratch, command: &str) {
+    let (arguments, file) = match command.split_once(" > ") {
+        Some((arguments, file)) => (arguments, Some(file)),
+        None => (command, None),
+    };
+    let words = arguments.split_whitespace();
+    let output = osteon().args(words).current_dir(scratch.path(".")).output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "osteon {command}: {errors}");
+    if let Some(file) = file {
+        fs::write(scratch.path(file), &output.stdout).unwrap();
+    }
+}
+
+/// The pages for users that show files and commands, with the least number of commands of each.
+const GUIDES: [(&str, usize); 10] = [
+    ("docs/quick-start.md", 5),
+    ("docs/tutorial.md", 3),
+    ("docs/how-to-csv.md", 2),
+    ("docs/how-to-observables.md", 2),
+    ("docs/how-to-attenuation.md", 3),
+    ("docs/how-to-cluster.md", 2),
+    ("docs/how-to-resume.md", 2),
+    ("docs/how-to-posterior.md", 1),
+    ("docs/how-to-reproduce.md", 4),
+    ("docs/materials.md", 5),
+];
+
+#[test]
+fn the_guides_commands_run_on_the_files_that_they_show() {
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    // What several pages do with the examples is done once.
+    let mut done = BTreeSet::new();
+    for (page, least) in GUIDES {
+        let scratch = Scratch::new();
+        copy(&examples, &scratch.path("examples"));
+        write_files(page, &scratch);
+        let all = commands(page);
+        assert!(all.len() >= least, "{page}: {all:?}");
+        for command in &all {
+            if !command.contains(" examples/") || done.insert(command.clone()) {
+                run_in(&scratch, command);
+            }
+        }
+        check_guide(page, &scratch);
+    }
+}
+
+/// Checks what a page says of its results.
+fn check_guide(page: &str, scratch: &Scratch) {
+    let read = |name: &str| fs::read_to_string(scratch.path(name)).unwrap();
+    let json = |name: &str| serde_json::from_str::<serde_json::Value>(&read(name)).unwrap();
+    match page {
+        "docs/quick-start.md" => {
+            // The tutorial quotes these.
+            let pairs = read("patients/comparison.csv");
+            assert!(pairs.contains("\nP01,P02,-190."), "{pairs}");
+            let text =
+                fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/tutorial.md"));
+            assert!(text.unwrap().contains("> -190 m/s (95 % interval -234 to -147 m/s)"));
+            assert!(pairs.contains(",-233.7") && pairs.contains(",-147.0"), "{pairs}");
+        }
+        "docs/how-to-csv.md" => {
+            let job = read("messung/job.toml");
+            assert!(job.contains("3871.0, 3923.0, 3899.0, 3951.0, 3884.0"), "{job}");
+        }
+        "docs/how-to-reproduce.md" => {
+            assert_eq!(json("original/result.json"), json("again/result.json"));
+        }
+        "docs/how-to-posterior.md" => {
+            assert!(read("posterior/posterior.csv").lines().count() > 100);
+        }
+        _ => {}
+    }
+}
+
 /// Returns `page` with the text between the two marks replaced.
 fn with_keys(page: &str, name: &str, table: &str) -> String {
     let (begin, end) = (format!("<!-- keys of {name} -->\n"), "<!-- end of keys -->");
@@ -210,6 +285,6 @@ fn the_tables_of_keys_are_those_of_the_program() {
     if std::env::var_os("OSTEON_WRITE_DOCS").is_some() {
         fs::write(&path, &current).unwrap();
     } else {
-        assert!(page == current, "after a change: cargo xtask docs");
+        assert!(page == current, "after a change: cargo xtask reference");
     }
 }

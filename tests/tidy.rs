@@ -65,6 +65,7 @@ fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
         ("osteon-proto", "osteon-files"),
         ("osteon-python", "osteon-common"),
         ("osteon-python", "osteon-files"),
+        ("osteon-python", "osteon-proto"),
         ("osteon-python", "osteon-solver"),
         ("osteon-search", "osteon-common"),
         ("osteon-solver", "osteon-common"),

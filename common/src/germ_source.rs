@@ -105,6 +105,19 @@ impl GermMaker {
         }
     }
 
+    /// Returns germ 11 of one realization.
+    pub(crate) fn first_germ(&self, index: u64) -> f64 {
+        let GermSource { seed, scheme } = self.source;
+        match scheme {
+            GermScheme::Streams => Germs::first(seed, index),
+            GermScheme::Sobol { points } => {
+                let points = points.max(1);
+                self.of_elasticity
+                    .with(seed, index / points, |scramble| uniform(scramble.first(index % points)))
+            }
+        }
+    }
+
     /// Returns germ 11 of realizations 0, 1, … `count` - 1.
     pub(crate) fn first_germs(&self, count: u64) -> Box<dyn Iterator<Item = f64> + '_> {
         let seed = self.source.seed;

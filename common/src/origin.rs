@@ -12,6 +12,8 @@ pub struct Origin {
     /// Name of a column that seems to name the subject of each velocity, and is not used: within a
     /// set it has several values of which some repeat.
     pub unused_subjects: Option<String>,
+    /// Number of rows that were left out, as a value was missing.
+    pub left_out: u32,
 }
 
 impl Origin {

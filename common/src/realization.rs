@@ -92,9 +92,16 @@ impl Ensemble {
     /// constants are not computed, which saves 99 % of the work. A speed may exist even if the
     /// whole bone does not.
     pub(crate) fn longitudinal_speeds(&self, count: u64) -> impl Iterator<Item = f64> {
-        self.germs
-            .first_germs(count)
-            .map(|germ| (self.law.c1111(germ) / self.point.density()).sqrt())
+        self.germs.first_germs(count).map(|germ| self.speed_of_germ(germ))
+    }
+
+    /// Returns √(c1111/ρ), m/s, of the bone at `index`, the same as [`Self::longitudinal_speeds`].
+    pub(crate) fn longitudinal_speed(&self, index: u64) -> f64 {
+        self.speed_of_germ(self.germs.first_germ(index))
+    }
+
+    fn speed_of_germ(&self, germ: f64) -> f64 {
+        (self.law.c1111(germ) / self.point.density()).sqrt()
     }
 
     /// Returns mean, m/s, and variance, m²/s², of √(c1111/ρ) under the law.
@@ -132,6 +139,8 @@ mod tests {
                 (bone.elasticity.rows()[0][0] / bone.density).sqrt()
             };
             assert!(ensemble.longitudinal_speeds(20).eq((0..20).map(of_bone)), "{scheme:?}");
+            let one_by_one = (0..20).map(|index| ensemble.longitudinal_speed(index));
+            assert!(one_by_one.eq((0..20).map(of_bone)), "{scheme:?}");
         }
     }
 

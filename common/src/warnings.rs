@@ -147,6 +147,13 @@ impl Warnings {
                 ),
             );
         }
+        if let Some(left_out) = origin.map(|origin| origin.left_out).filter(|&count| count > 0) {
+            let message = match left_out {
+                1 => "a row has a missing value and is left out".to_owned(),
+                _ => format!("{left_out} rows have a missing value and are left out"),
+            };
+            self.add("data.missing", message);
+        }
         match &data.measurements {
             Measurements::Moments { mean, coefficient_of_variation, .. } => {
                 self.number("data.mean", *mean, &plausible::VELOCITY);
@@ -349,6 +356,7 @@ mod tests {
             path: "v.csv".into(),
             lines: vec![(2..22).collect()],
             unused_subjects: Some("patient".to_owned()),
+            left_out: 0,
         };
         let mut warnings = Warnings::default();
         warnings.data(&Data::from_velocities(velocities), Some(&origin));
@@ -375,8 +383,12 @@ mod tests {
         };
         assert_eq!(warnings(&velocities, None), [""; 0]);
         velocities[17] = 7800.0;
-        let origin =
-            Origin { path: "v.csv".into(), lines: vec![(2..42).collect()], unused_subjects: None };
+        let origin = Origin {
+            path: "v.csv".into(),
+            lines: vec![(2..42).collect()],
+            unused_subjects: None,
+            left_out: 0,
+        };
         assert_eq!(
             warnings(&velocities, Some(&origin)),
             [

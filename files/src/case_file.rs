@@ -14,6 +14,7 @@ use osteon_common::plausible::PlausibleRange;
 use crate::document::{self, Format, Node, Value};
 use crate::file_error::{self, Bound, ContentError, FileError};
 use crate::job_file;
+use crate::materials::{self, Base};
 use crate::reader::{Reader, Table};
 
 pub use crate::toml_text::case as to_toml;
@@ -63,37 +64,44 @@ pub fn parse(text: &str, format: Format) -> Result<Case, ContentError> {
 
 /// Returns the bone, or `None` after recording the violations.
 fn bone(reader: &mut Reader, root: &Table<'_>) -> Option<Bone> {
-    let mut keys = vec![Parameter::Density.name(), "mandel"];
+    let mut keys = vec![materials::KEY, Parameter::Density.name(), "mandel"];
     keys.extend(CONSTANTS.map(Parameter::name));
     let table = reader.table(root, "bone", &keys);
     if !table.is_table() {
         if !root.has("bone") {
-            let message = format!("is missing; it must have density and {FORMS}");
+            let message = format!("is missing; it must have a material, or density and {FORMS}");
             reader.lacks("bone", &["bone".to_owned()], message);
         }
         return None;
     }
-    let given: Vec<_> = CONSTANTS.into_iter().filter(|key| table.has(key.name())).collect();
+    let base = Base::read(reader, &table);
+    let named = table.has(materials::KEY).then_some(materials::KEY);
+    let given =
+        named.or_else(|| CONSTANTS.map(Parameter::name).into_iter().find(|key| table.has(key)));
     // Matrices are written by programs and may have any scale; constants are typed by people, so
     // their unit is checked.
-    let density = required(reader, &table, Parameter::Density, !given.is_empty());
-    let elasticity = match (table.has("mandel"), given.first()) {
+    let density = required(reader, &table, Parameter::Density, base, given.is_some());
+    let elasticity = match (table.has("mandel"), given) {
         (true, None) => mandel(reader, &table),
-        (true, Some(constant)) => {
-            let constant = constant.name();
-            reader.violations.add(
-                "bone.mandel",
-                format!("is given together with {constant}; give {FORMS}, not both"),
-            );
+        (true, Some(other)) => {
+            let cure = match other {
+                materials::KEY => "leave one of them out".to_owned(),
+                _ => format!("give {FORMS}, not both"),
+            };
+            reader.violations.add("bone.mandel", format!("is given together with {other}; {cure}"));
             None
         }
         (false, None) => {
-            let cures = [&["mandel"][..], &CONSTANTS.map(Parameter::name)].concat();
+            let cures = [&["mandel", materials::KEY][..], &CONSTANTS.map(Parameter::name)].concat();
             let cures: Vec<_> = cures.into_iter().map(|key| table.path(key)).collect();
-            reader.lacks("bone", &cures, format!("has no elasticity; give {FORMS}"));
+            reader.lacks(
+                "bone",
+                &cures,
+                format!("has no elasticity; give {FORMS}, or name a material"),
+            );
             None
         }
-        (false, Some(_)) => from_constants(reader, &table),
+        (false, Some(_)) => from_constants(reader, &table, base),
     };
     Some(Bone { density: density?, elasticity: elasticity? })
 }
@@ -101,18 +109,24 @@ fn bone(reader: &mut Reader, root: &Table<'_>) -> Option<Bone> {
 /// The forms in which an elasticity may be given.
 const FORMS: &str = "either the five engineering constants or mandel";
 
-/// Reads a required number of `[bone]` and checks its range and, if it is `typed` by a person, its
-/// unit.
+/// Reads a number of `[bone]`, which only a material can stand in for, and checks its range and, if it
+/// is `typed` by a person, its unit.
 fn required(
     reader: &mut Reader,
     table: &Table<'_>,
     parameter: Parameter,
+    base: Base,
     typed: bool,
 ) -> Option<f64> {
     let (key, accepted) = (parameter.name(), Interval::of(parameter));
     if !table.has(key) {
-        reader.missing(table, key, accepted);
-        return None;
+        let value = base.value(parameter);
+        if value.is_none() {
+            let cures = [key, materials::KEY].map(|key| table.path(key));
+            let message = format!("is missing; it must be {accepted}");
+            reader.lacks(&cures[0], &cures, message);
+        }
+        return value;
     }
     let value = reader.number(table, key)?;
     let path = table.path(key);
@@ -125,9 +139,12 @@ fn required(
     (!reader.violations.has_at_or_below(&path)).then_some(value)
 }
 
-fn from_constants(reader: &mut Reader, table: &Table<'_>) -> Option<Elasticity> {
+fn from_constants(reader: &mut Reader, table: &Table<'_>, base: Base) -> Option<Elasticity> {
     let [e_l, nu_l, g_l, e_t, nu_t] =
-        CONSTANTS.map(|parameter| required(reader, table, parameter, true));
+        CONSTANTS.map(|parameter| required(reader, table, parameter, base, true));
+    if matches!(base, Base::Unknown) {
+        return None;
+    }
     let constants = EngineeringConstants {
         longitudinal_young_modulus: e_l?,
         longitudinal_poisson_ratio: nu_l?,

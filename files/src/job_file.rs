@@ -1,5 +1,6 @@
 //! Job files: the specification of a job, in TOML or JSON.
 
+mod csv_format;
 mod data_section;
 mod key_tables;
 mod parameters;

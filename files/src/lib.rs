@@ -1,15 +1,18 @@
 //! The files of osteon's users: they are read, checked and written here.
 //!
 //! Jobs and cases in TOML or JSON ([`job_file`], [`case_file`]), measured velocities in CSV, and the
-//! results of jobs in JSON ([`report`]) and CSV ([`results_csv`]). The checks themselves are in
-//! `osteon-common`, because specifications that come as messages must pass them, too.
+//! results of jobs in JSON ([`report`]) and CSV ([`results_csv`]); published stiffness by name
+//! ([`materials`]). The checks themselves are in `osteon-common`, because specifications that come as
+//! messages must pass them, too.
 //!
 //! Every file that a user names is opened by [`user_file`].
 
 pub mod case_file;
 pub mod document;
 pub mod file_error;
+pub mod init;
 pub mod job_file;
+pub mod materials;
 pub mod posterior_csv;
 mod reader;
 pub mod report;

@@ -197,6 +197,34 @@ impl Reader {
         }
     }
 
+    /// Reads the text `key`.
+    pub(crate) fn text<'a>(
+        &mut self,
+        table: &Table<'a>,
+        key: &str,
+        expected: &str,
+    ) -> Option<&'a str> {
+        match &table.get(key)?.value {
+            Value::Text(text) => Some(text),
+            other => {
+                self.wrong_type(table.path(key), expected, other);
+                None
+            }
+        }
+    }
+
+    /// Reads the texts `elements` of the list at `path`; `None` if one is not a text.
+    pub(crate) fn texts<'a>(&mut self, path: &str, elements: &'a [Node]) -> Option<Vec<&'a str>> {
+        let mut texts = Vec::with_capacity(elements.len());
+        for (index, node) in elements.iter().enumerate() {
+            match &node.value {
+                Value::Text(text) => texts.push(text.as_str()),
+                other => self.wrong_type(element_path(path, index), "a text in quotes", other),
+            }
+        }
+        (texts.len() == elements.len()).then_some(texts)
+    }
+
     /// Reads the elements of the list `key`.
     pub(crate) fn list<'a>(
         &mut self,

@@ -1,15 +1,17 @@
 //! Measured velocities from a CSV file.
 //!
 //! The first line that is neither empty nor a comment (`#`) names the columns; `velocity` (m/s) is
-//! one of them, others may name the group and the subject of each velocity; all further columns are
-//! ignored. Fields may be quoted, but contain no line break.
+//! one of them, unless the job file says otherwise; others may name the group and the subject of each
+//! velocity; all further columns are ignored. Fields may be quoted, but contain no line break.
 
 mod columns;
+mod csv_format;
+mod fields;
 mod problem;
+mod text_lines;
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 use osteon_common::check::VELOCITIES_MIN;
@@ -20,13 +22,13 @@ use osteon_common::parameters::Parameter;
 use osteon_common::{limits, visible};
 use thiserror::Error;
 
-use crate::file_error::without_byte_order_mark;
-use crate::user_file;
-
-use self::columns::{Columns, Row};
+use self::columns::{Columns, CsvLine, Row};
 use self::problem::{Problem, shortened};
+use self::text_lines::LineReader;
 
-pub(crate) use self::columns::NamedColumns;
+pub(crate) use self::columns::{NamedColumns, is_like_subject, is_like_velocity};
+pub(crate) use self::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
+pub(crate) use self::fields::csv_fields;
 
 /// Maximum number of bad lines that are reported individually.
 const REPORTED_MAX: usize = 10;
@@ -66,15 +68,16 @@ impl CsvError {
 /// All errors in the file, up to [`REPORTED_MAX`] lines.
 pub(crate) fn read(
     path: &Path,
-    named: NamedColumns<'_>,
+    named: &NamedColumns<'_>,
+    format: &CsvFormat,
 ) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
     let located = |(line, problem)| CsvError { path: path.to_owned(), line, problem };
-    let (gathered, columns) = open(path)
+    let (gathered, columns) = text_lines::open(path, format.encoding)
         .map_err(|problem| vec![(None, problem)])
-        .and_then(|file| parse(file, named))
+        .and_then(|file| parse(file, named, format))
         .map_err(|problems| problems.into_iter().map(located).collect::<Vec<_>>())?;
     let measured = gathered.finish(path, &columns);
-    if let Some(column) = named.group
+    if let Some(column) = named.group.first()
         && measured.data.iter().all(|group| group.no_variation().is_some())
     {
         let problem = Problem::NoVariation { column: shortened(column) };
@@ -83,30 +86,15 @@ pub(crate) fn read(
     Ok(measured)
 }
 
-fn open(path: &Path) -> Result<impl BufRead, Problem> {
-    let open = || -> io::Result<(File, u64)> {
-        let file = user_file::open(path)?;
-        let length = file.metadata()?.len();
-        Ok((file, length))
-    };
-    match open().map_err(Problem::Unreadable)? {
-        (_, length) if length > limits::FILE_BYTES_MAX => Err(Problem::TooLarge),
-        // Data appended while the file is read are ignored.
-        (file, length) => Ok(BufReader::new(file.take(length))),
-    }
-}
-
 type LocatedProblem = (Option<usize>, Problem);
 
 fn parse(
     file: impl BufRead,
-    named: NamedColumns<'_>,
+    named: &NamedColumns<'_>,
+    format: &CsvFormat,
 ) -> Result<(CollectedVelocities, Columns), Vec<LocatedProblem>> {
-    let mut lines = LineReader { file, number: 0, bytes: Vec::new() };
-    let header = lines.next().map_err(|problem| vec![problem])?;
-    let (number, header) = header.ok_or_else(|| vec![(None, Problem::Empty)])?;
-    let columns =
-        Columns::from_header(header, named).map_err(|problem| vec![(Some(number), problem)])?;
+    let mut lines = LineReader::new(file);
+    let columns = columns(&mut lines, named, format).map_err(|problem| vec![problem])?;
     let mut gathered =
         CollectedVelocities { has_subjects: named.subject.is_some(), ..Default::default() };
     let mut problems = Vec::new();
@@ -114,7 +102,9 @@ fn parse(
         match lines.next() {
             Ok(None) => break,
             Ok(Some((number, line))) => match columns.row(line) {
-                Ok(row) => match gathered.contradiction(&row, &columns) {
+                Ok(CsvLine::Blank) => {}
+                Ok(CsvLine::Missing) => gathered.left_out += 1,
+                Ok(CsvLine::Row(row)) => match gathered.contradiction(&row, &columns) {
                     Some(problem) => problems.push((Some(number), problem)),
                     None => gathered.add(number, row).map_err(|problem| vec![(None, problem)])?,
                 },
@@ -138,50 +128,26 @@ fn parse(
     if problems.is_empty() { Ok((gathered, columns)) } else { Err(problems) }
 }
 
-/// The lines of a file, of which one is in memory at a time.
-struct LineReader<R> {
-    file: R,
-    /// Number of the last line, from 1.
-    number: usize,
-    bytes: Vec<u8>,
-}
-
-impl<R: BufRead> LineReader<R> {
-    /// Returns the next line that is neither empty nor a comment, without its end, and its number.
-    fn next(&mut self) -> Result<Option<(usize, &str)>, LocatedProblem> {
-        loop {
-            self.bytes.clear();
-            // The line end takes at most two bytes.
-            let most = limits::LINE_BYTES_MAX as u64 + 2;
-            let mut line = self.file.by_ref().take(most);
-            let read = line.read_until(b'\n', &mut self.bytes);
-            if read.map_err(|error| (None, Problem::Unreadable(error)))? == 0 {
-                return Ok(None);
-            }
-            self.number += 1;
-            if self.bytes.last() == Some(&b'\n') {
-                self.bytes.pop();
-            }
-            if self.bytes.last() == Some(&b'\r') {
-                self.bytes.pop();
-            }
-            if self.bytes.len() > limits::LINE_BYTES_MAX {
-                return Err((Some(self.number), Problem::LongLine));
-            }
-            // Checked here and borrowed after the loop: a borrow that is returned would last for
-            // all iterations.
-            let text = str::from_utf8(&self.bytes);
-            let text = text.map_err(|_| (Some(self.number), Problem::NotUtf8))?;
-            let begin = without_byte_order_mark(text).trim_start();
-            if !begin.is_empty() && !begin.starts_with('#') {
-                break;
+/// Reads the header, and a line above it that names the separator.
+fn columns(
+    lines: &mut LineReader<impl BufRead>,
+    named: &NamedColumns<'_>,
+    format: &CsvFormat,
+) -> Result<Columns, LocatedProblem> {
+    let mut above = None;
+    // At most one line is above the header.
+    for _ in 0..2 {
+        let (number, line) = lines.next()?.ok_or((None, Problem::Empty))?;
+        if above.is_none() {
+            above = Separator::of_first_line(line);
+            if above.is_some() {
+                continue;
             }
         }
-        // Was already checked to be UTF-8.
-        let text = str::from_utf8(&self.bytes).unwrap_or_default();
-        let text = if self.number == 1 { without_byte_order_mark(text) } else { text };
-        Ok(Some((self.number, text)))
+        return Columns::from_header(line, above, named, format)
+            .map_err(|problem| (Some(number), problem));
     }
+    Err((None, Problem::Empty))
 }
 
 /// The velocities read so far.
@@ -191,6 +157,8 @@ struct CollectedVelocities {
     /// Position of each group, by its name.
     places: BTreeMap<String, usize>,
     count: usize,
+    /// Number of rows with a value that is missing.
+    left_out: u32,
     /// Whether a column of subjects is named.
     has_subjects: bool,
     /// Number of subjects in all groups.
@@ -270,6 +238,7 @@ impl CollectedVelocities {
         let origin = Origin {
             path: path.to_owned(),
             unused_subjects: unused.map(shortened),
+            left_out: self.left_out,
             lines: Vec::with_capacity(self.groups.len()),
         };
         let mut measured = Measured { data: Vec::with_capacity(self.groups.len()), origin };

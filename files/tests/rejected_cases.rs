@@ -148,7 +148,7 @@ fn files_that_cannot_be_read() {
     check(
         "d.TOML",
         Some(b""),
-        "DIR/d.TOML: 1 error\n  bone: is missing; it must have density and either the five \
+        "DIR/d.TOML: 1 error\n  bone: is missing; it must have a material, or density and either the five \
          engineering constants or mandel",
     );
     assert!(case_file::read(directory.path()).is_err());

@@ -5,9 +5,11 @@
     3908.8
 
 :func:`simulate` and :func:`velocities` solve cases, :func:`ensemble` draws random bones, :class:`Job`
-identifies, on this machine or on a cluster, and :class:`Client` speaks to a coordinator.
+identifies, on this machine or on a cluster, and :class:`Client` speaks to a coordinator. :mod:`osteon.workers`
+starts workers inside of Dask and Ray, :mod:`osteon.rpc` helps programs that speak gRPC themselves.
 """
 
+from osteon import workers
 from osteon._client import Client
 from osteon._jobs import Job
 from osteon._native import Case
@@ -56,4 +58,5 @@ __all__ = [
     "ensemble",
     "simulate",
     "velocities",
+    "workers",
 ]

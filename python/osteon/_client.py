@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import queue
-import tempfile
 import threading
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
@@ -60,14 +59,17 @@ class Client:
             request_id: the same text for the same job makes no second job, however often it is submitted.
         """
         kind = kind or job.kind
-        with tempfile.TemporaryDirectory(prefix="osteon-") as scratch:
-            file = Path(scratch, "job.toml")
+        scratch = Scratch()
+        try:
+            file = scratch.path / "job.toml"
             file.write_text(job.to_toml(kind), encoding="utf-8")
             arguments = ["submit", str(file), "--json", "--priority", str(priority)]
             arguments += ["--propagate"] if kind == "propagation" else []
             arguments += [] if name is None else ["--name", name]
             arguments += [] if request_id is None else ["--request-id", request_id]
             return str(self._json(arguments)["job"])
+        finally:
+            scratch.remove()
 
     def jobs(self) -> list[JobState]:
         """The jobs that the coordinator knows, oldest first."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any, TypedDict, Union, cast
 
@@ -85,6 +84,8 @@ def column(frame: Any, name: object, field: str) -> np.ndarray[Any, Any]:
     """A column of a frame."""
     names = [str(known) for known in frame.columns]
     if name not in names:
+        import difflib
+
         near = difflib.get_close_matches(str(name), names, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"the columns are: {', '.join(names)}"
         refuse(field, f"the frame has no column {name!r}; {hint}")

@@ -153,6 +153,11 @@ class Job:
         data, :meth:`propagate`) runs it."""
         return self._check(kind or self.kind).to_toml()
 
+    def to_message(self, kind: Kind | None = None) -> bytes:
+        """The same as an encoded message `osteon.v1.JobSpecification`; :func:`osteon.rpc.specification`
+        decodes it."""
+        return self._check(kind or self.kind).to_message()
+
     @property
     def kind(self) -> Kind:
         """`identification` if it has data, otherwise `propagation`."""

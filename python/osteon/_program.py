@@ -8,7 +8,7 @@ Ctrl-C reaches it and not the threads of Python, and its results are those of th
 from __future__ import annotations
 
 import contextlib
-import importlib.metadata
+import functools
 import json
 import os
 import queue
@@ -22,10 +22,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
+from osteon import _native
 from osteon.errors import InputError, OsteonWarning, ProgramError
 
 INTERRUPT_S = 15.0
 """Longest time that an interrupted program may take to end in order."""
+
+VERSION_S = 30.0
+"""Longest time that the program may take to say its version."""
 
 POLL_S = 0.1
 """Time between two looks at signals."""
@@ -58,8 +62,11 @@ def find() -> Path:
     """The program: of this package, or of the directory for scripts.
 
     Raises:
-        ProgramError: it is not there.
+        ProgramError: it is not there, or has another version than the native module.
     """
+    # Imported here, because it takes a quarter of the time of `import osteon`.
+    import importlib.metadata
+
     candidates = []
     with contextlib.suppress(importlib.metadata.PackageNotFoundError):
         for file in importlib.metadata.files("osteon") or ():
@@ -69,9 +76,37 @@ def find() -> Path:
     candidates += [Path(sysconfig.get_path("scripts", scheme)) / "osteon" for scheme in schemes]
     for candidate in candidates:
         if os.access(candidate, os.X_OK):
+            check_version(candidate)
             return candidate
     places = ", ".join(str(candidate) for candidate in candidates)
     raise ProgramError(f"the program osteon is not there ({places}); install the package again")
+
+
+@functools.lru_cache(maxsize=8)
+def check_version(program: Path) -> None:
+    """Checks, once for each program, that it computes what the native module does.
+
+    Raises:
+        ProgramError: it has another version or another revision of the numerics.
+    """
+    try:
+        said = subprocess.run(
+            [program, "--version"],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=VERSION_S,
+            check=False,
+            encoding="utf-8",
+            errors="replace",
+        ).stdout
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise ProgramError(f"cannot run {program}: {error}; install the package again") from error
+    version, numerics = _native.version()
+    if not said.startswith(f"osteon {version} ") or f"numerics {numerics}," not in said:
+        raise ProgramError(
+            f"the program {program} has another version ({said.strip() or 'it says none'}) than the package "
+            f"({version}, numerics {numerics}), and may give other numbers; install the package again"
+        )
 
 
 def run(

@@ -357,6 +357,10 @@ class Parameters(TypedDict, total=False):
     coupling_sound_speed: ParametersCouplingSoundSpeed
     """Speed of sound of the coupling layer, m/s."""
 
+    material: Literal["human-radius-desceliers", "human-femur-ashman-1984", "human-femur-dong-2004", "human-femur-dry-yoon-1976", "human-tibia-rho-1996", "bovine-femur-haversian-katz-1984", "bovine-femur-plexiform-katz-1984", "bovine-femur-van-buskirk-1981", "bovine-phalanx-lang-1969", "sawbones-cortical-2016"]
+    """Name of a material (osteon materials lists them): parameters that are left out are fixed
+    at its values, and those with bounds alone start there; the dispersion must be given."""
+
 
 class RandomBoneThickness(TypedDict, total=False):
     """Scatter of the bone's thickness about layers.bone.thickness."""

@@ -6,7 +6,10 @@ use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::version::Program;
 use osteon_common::warnings::job_warnings;
 use osteon_files::job_file;
+use osteon_proto::specification;
+use prost::Message as _;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::case::format_named;
 use crate::ensemble::PyEnsemble;
@@ -48,6 +51,14 @@ impl PyJob {
     /// The complete job file, with defaults and data, which reads back to the same bits.
     fn to_toml(&self, py: Python<'_>) -> PyResult<String> {
         errors::computed(py, || job_file::to_toml(&self.specification))
+    }
+
+    /// The job as an encoded message `osteon.v1.JobSpecification`.
+    fn to_message<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let message = errors::computed(py, || {
+            specification::to_message(&self.specification).encode_to_vec()
+        })?;
+        Ok(PyBytes::new(py, &message))
     }
 
     /// What is allowed but unusual.

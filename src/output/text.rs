@@ -24,11 +24,13 @@ use osteon_proto::v1::{
     WorkerSnapshot,
 };
 
-use self::layout::{WIDTH, aligned, glued, wrapped};
+use self::layout::{WIDTH, aligned, glued};
 use self::number::significant;
 use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation};
 use crate::client;
 use crate::progress::{JobProgress, line, span};
+
+pub(crate) use self::layout::wrapped;
 
 /// Width of the time before a line of `watch`, in columns.
 const TIME_WIDTH: usize = 9;

@@ -1,5 +1,6 @@
 //! All developer commands: `cargo xtask COMMAND`. CI calls `cargo xtask ci`.
 
+mod book;
 mod chaos;
 mod deny;
 mod deploy;
@@ -91,6 +92,26 @@ const TASKS: &[(&str, &str, Action)] = &[
         Action::Function(umbridge::test),
     ),
     (
+        "pools",
+        "tests workers inside of a real Dask and a real Ray; takes names of tests",
+        Action::Function(python::pools),
+    ),
+    (
+        "notebooks",
+        "executes examples/notebooks with small sizes; takes names of tests",
+        Action::Function(python::notebooks),
+    ),
+    (
+        "stubs",
+        "makes the messages and stubs of the Python package from the .proto files",
+        Action::Function(python::stubs),
+    ),
+    (
+        "wheels",
+        "builds manylinux wheels: x86_64 and aarch64, or those named",
+        Action::Function(python::wheels),
+    ),
+    (
         "deny",
         "licences, versions, sources and advisories of the crates that osteon is built from",
         Action::Function(deny::check),
@@ -112,7 +133,7 @@ const TASKS: &[(&str, &str, Action)] = &[
     ),
     (
         "ci",
-        "what CI runs: lint, deny, every test, tracing, metrics, Python, UM-Bridge, deploy, Slurm if \
+        "what CI runs: lint, deny, every test, tracing, metrics, book, Python, UM-Bridge, deploy, Slurm if \
          installed",
         Action::Commands(&[
             &["lint"],
@@ -120,6 +141,7 @@ const TASKS: &[(&str, &str, Action)] = &[
             &["test"],
             &["tracing"],
             &["metrics"],
+            &["book"],
             &["python"],
             &["umbridge"],
             &["deploy"],
@@ -130,6 +152,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         "slurm",
         "tests the commands for Slurm on a real one on this machine; takes names of tests",
         Action::Function(slurm::test),
+    ),
+    (
+        "book",
+        "builds the documentation as a book, and checks its links",
+        Action::Function(book::build),
     ),
     (
         "tables",
@@ -156,6 +183,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         "bench-fleet",
         "measures jobs on fleets of simulated workers; --help lists the options",
         Action::Function(fleet::bench),
+    ),
+    (
+        "bench-python",
+        "measures what Python adds to the time of velocities: --rounds N (20)",
+        Action::Function(python::bench),
     ),
     (
         "bench-peers",
@@ -267,7 +299,10 @@ fn installed(name: &str, version: &str, options: &[&str]) -> Result<PathBuf> {
     let tools = programs()?.with_file_name("tools");
     let program = tools.join("bin").join(name);
     let present = Command::new(&program).arg("--version").output().is_ok_and(|output| {
-        String::from_utf8_lossy(&output.stdout).trim().split(' ').next_back() == Some(version)
+        let text = String::from_utf8_lossy(&output.stdout);
+        // Some print `name 1.2.3`, others `name v1.2.3`.
+        let last = text.trim().split(' ').next_back().unwrap_or_default();
+        last.strip_prefix('v').unwrap_or(last) == version
     });
     if !present {
         let install = ["install", name, "--version", version, "--locked", "--force", "--root"];

@@ -3,16 +3,17 @@
 
 use std::env;
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, cargo_command, programs, root};
+use crate::{cargo, cargo_command, output, programs, root};
 
 /// What both need, for the message of a failure.
-const NEEDS: &str = "the tests in Python need Python 3.10 or later with its module venv (on Debian the packages \
-                     python3 and python3-venv), and the packages of their requirements.txt";
+const NEEDS: &str = "the tests in Python need Python 3.10 or later (notebooks and pools: 3.11) with its module \
+                     venv (on Debian the packages python3 and python3-venv), and the packages of their \
+                     requirements.txt";
 
 /// Runs the tests of both, or those that `words` name. Uses `python3`, or the interpreter named by the
 /// variable `PYTHON`; fails if there is none.
@@ -26,11 +27,67 @@ pub(crate) fn test(words: &[String]) -> Result<()> {
         cargo(command.args(client)).context(NEEDS)?;
     }
     if words.is_empty() || !package.is_empty() {
-        let mut command = python("python/check.py");
-        command.arg("--work").arg(programs()?.with_file_name("python-package"));
-        cargo(command.args(package)).context(NEEDS)?;
+        check("package", &package)?;
     }
     Ok(())
+}
+
+/// Executes the notebooks of `examples/notebooks`, or those whose tests `words` name.
+pub(crate) fn notebooks(words: &[String]) -> Result<()> {
+    check("notebooks", words)
+}
+
+/// Tests workers inside of a real Dask and a real Ray cluster, or the tests that `words` name.
+pub(crate) fn pools(words: &[String]) -> Result<()> {
+    check("pools", words)
+}
+
+/// Measures what Python adds to the time of velocities, and how long an import takes, in release mode.
+pub(crate) fn bench(words: &[String]) -> Result<()> {
+    let build = ["bench", "--package", "osteon-python", "--bench", "bulk", "--no-run"];
+    let built = output(cargo_command(&build).arg("--message-format=json"))?;
+    let program = executable(&built).context("cargo built no benchmark")?;
+    let mut command = suite("bench")?;
+    command.args(["--profile", "release", "--"]).args(words).arg("--").arg(program);
+    cargo(&mut command).context(NEEDS)
+}
+
+/// Builds wheels that run on every Linux with a glibc of 2017 or later, for each of the processors that
+/// `words` name.
+pub(crate) fn wheels(words: &[String]) -> Result<()> {
+    let mut command = python("python/wheels.py");
+    command.arg("--work").arg(programs()?.with_file_name("python-wheels")).args(words);
+    cargo(&mut command).context(NEEDS)
+}
+
+/// Makes the messages and stubs that the package ships from the .proto files.
+pub(crate) fn stubs(words: &[String]) -> Result<()> {
+    if !words.is_empty() {
+        bail!("usage: cargo xtask stubs");
+    }
+    let mut command = python("python/protos.py");
+    command.arg("--environment").arg(programs()?.with_file_name("python-package").join("venv"));
+    cargo(&mut command).context(NEEDS)
+}
+
+/// Runs a suite of `python/check.py`, or those of its tests that `words` name.
+fn check(name: &str, words: &[impl AsRef<str>]) -> Result<()> {
+    let mut command = suite(name)?;
+    cargo(command.args(words.iter().map(AsRef::as_ref))).context(NEEDS)
+}
+
+/// Returns the command that runs a suite.
+fn suite(name: &str) -> Result<Command> {
+    let mut command = python("python/check.py");
+    let work = programs()?.with_file_name(format!("python-{name}"));
+    command.args(["--suite", name]).arg("--work").arg(work);
+    Ok(command)
+}
+
+/// Returns the program that cargo says it has built.
+fn executable(messages: &str) -> Option<PathBuf> {
+    let (_, rest) = messages.rsplit_once(r#""executable":""#)?;
+    rest.split_once('"').map(|(path, _)| PathBuf::from(path))
 }
 
 /// Returns whether a test, such as `test_jobs.Run`, is one of the package.

@@ -15,12 +15,17 @@ use crate::parameters::Point;
 use crate::realization::Ensemble;
 use crate::results::Moments;
 
+/// Number of realizations, the first ones, to which the regression is fitted. Of more than these it
+/// would cost as much as everything else that is done with an evaluation, and change an indication
+/// of the size by less than a hundredth of itself.
+const FITTED_MAX: usize = 1 << 16;
+
 /// Minimum number of successes for a parabola that is more than a fit of their noise.
 const SUCCESSES_MIN: usize = 10;
 
 /// Returns the moments that all realizations would have, by the regression of the velocity on
 /// √(c1111/ρ), minus those of the successes; 0 if none failed, `None` if it is unknown: for fewer
-/// than ten successes, or if all speeds are equal.
+/// than ten successes among the first 65,536 realizations, or if all speeds are equal.
 pub fn failure_bias(
     monte_carlo: &MonteCarlo,
     point: &Point,
@@ -28,16 +33,17 @@ pub fn failure_bias(
 ) -> Option<Moments> {
     let successes = outcomes.iter().filter_map(|outcome| outcome.ok());
     let found = central(successes.clone())?.moments();
-    let succeeded = successes.count();
-    if succeeded == outcomes.len() {
+    if successes.count() == outcomes.len() {
         return Some(Moments { mean: 0.0, coefficient_of_variation: 0.0 });
     }
-    if succeeded < SUCCESSES_MIN {
+    let fitted = &outcomes[..outcomes.len().min(FITTED_MAX)];
+    if fitted.iter().filter(|outcome| outcome.is_ok()).count() < SUCCESSES_MIN {
         return None;
     }
     let ensemble = Ensemble::drawn(point, monte_carlo.germs()).ok()?;
-    let speeds: Vec<f64> = ensemble.longitudinal_speeds(outcomes.len() as u64).collect();
-    let completed = Parabola::fit(outcomes, &speeds)?.completed(outcomes, &speeds);
+    let speeds: Vec<f64> = ensemble.longitudinal_speeds(fitted.len() as u64).collect();
+    let completed = Parabola::fit(fitted, &speeds)?
+        .completed(outcomes, |index| ensemble.longitudinal_speed(index as u64));
     let bias = Moments {
         mean: completed.mean - found.mean,
         coefficient_of_variation: completed.coefficient_of_variation
@@ -104,11 +110,14 @@ impl Parabola {
 
     /// Returns the moments of all realizations, where failed ones have the parabola's velocity and
     /// the scatter of its residuals.
-    fn completed(&self, outcomes: &[Outcome], speeds: &[f64]) -> Moments {
+    fn completed(&self, outcomes: &[Outcome], speed: impl Fn(usize) -> f64) -> Moments {
+        let failed = outcomes.iter().enumerate().filter(|(_, outcome)| outcome.is_err());
+        let expected: Vec<f64> = failed.map(|(index, _)| self.velocity(speed(index))).collect();
         let all = || {
-            outcomes.iter().zip(speeds).map(|(outcome, &speed)| match outcome {
+            let mut expected = expected.iter();
+            outcomes.iter().map(move |outcome| match outcome {
                 Ok(velocity) => (*velocity, 0.0),
-                Err(_) => (self.velocity(speed), self.residual),
+                Err(_) => (expected.next().copied().unwrap_or(f64::NAN), self.residual),
             })
         };
         let mean = average(all().map(|(velocity, _)| velocity));
@@ -162,6 +171,35 @@ mod tests {
         assert!((bias.mean - mean).abs() < 1e-9 * all.mean, "{bias:?}, {mean}");
         assert!((bias.coefficient_of_variation - variation).abs() < 1e-10, "{bias:?}, {variation}");
         assert!(mean < -10.0 && variation > 1e-3, "{mean} {variation}");
+    }
+
+    /// The velocities scatter about the parabola by a tenth of their own scatter.
+    #[test]
+    fn the_first_realizations_are_enough_for_the_regression() {
+        let count = 4 * FITTED_MAX;
+        let (all, outcomes) = outcomes(count as u64, 3500.0);
+        let spread = moments(&all).unwrap();
+        let tenth = 0.1 * spread.mean * spread.coefficient_of_variation;
+        let noise =
+            |index: usize| f64::from((index as u32).wrapping_mul(2_654_435_769)) / 2e9 - 1.0;
+        let scattered = outcomes.iter().enumerate();
+        let outcomes: Vec<Outcome> =
+            scattered.map(|(i, outcome)| outcome.map(|v| v + tenth * noise(i))).collect();
+        let ensemble = Ensemble::drawn(&POINT, MonteCarlo::default().germs()).unwrap();
+        let speeds: Vec<f64> = ensemble.longitudinal_speeds(count as u64).collect();
+        let of_all = Parabola::fit(&outcomes, &speeds).unwrap().completed(&outcomes, |i| speeds[i]);
+        let successes: Vec<f64> = outcomes.iter().filter_map(|outcome| outcome.ok()).collect();
+        let found = moments(&successes).unwrap();
+        let bias = failure_bias(&MonteCarlo::default(), &POINT, &outcomes).unwrap();
+        let expected = [
+            of_all.mean - found.mean,
+            of_all.coefficient_of_variation - found.coefficient_of_variation,
+        ];
+        for (bias, expected) in [bias.mean, bias.coefficient_of_variation].into_iter().zip(expected)
+        {
+            assert!((bias / expected - 1.0).abs() < 0.01, "{bias} {expected}");
+            assert_ne!(bias, expected, "the regression was fitted to all");
+        }
     }
 
     #[test]

@@ -11,24 +11,54 @@ use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::origin::Origin;
 use osteon_common::parameters::Parameter;
 
+use super::csv_format;
 use crate::document::{Node, Value};
 use crate::reader::{Reader, Table};
-use crate::velocities::{self, CsvError, Measured, NamedColumns};
+use crate::velocities::{self, CsvError, CsvFormat, Measured, NamedColumns};
 
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 
 /// The keys of `[data]`.
-pub(super) const KEYS: [Key; 12] = [
+pub(super) const KEYS: [Key; 18] = [
     Key {
         name: "velocities",
         meaning: "for `identify`: path of a CSV file, relative to the job file's directory, with a \
                   header and a column `velocity` in m/s (other columns, and lines that start with \
-                  `#`, are ignored); or a list of velocities",
+                  `#`, are ignored), or as the next six keys say; or a list of velocities",
+    },
+    Key {
+        name: "column",
+        meaning: "name of the CSV column of velocities (default `\"velocity\"`)",
+    },
+    Key {
+        name: "unit",
+        meaning: "unit of the velocities in the file: `\"m/s\"` (default) or `\"km/s\"` or `\"mm/us\"`",
+    },
+    Key {
+        name: "separator",
+        meaning: "what separates the fields of the file: `\",\"` (default) or `\";\"` or `\"tab\"` or `\"|\"`; \
+                  without the key, a first line such as `sep=;` is obeyed",
+    },
+    Key {
+        name: "decimal",
+        meaning: "the decimal mark of the file's numbers: `\".\"` (default) or `\",\"`",
+    },
+    Key {
+        name: "missing",
+        meaning: "texts that stand for a missing value, such as `[\"\", \"NA\", \"-999\"]`, at most 20: a row \
+                  with one of them in a column that is used is left out (default: none, every row needs a \
+                  velocity)",
+    },
+    Key {
+        name: "encoding",
+        meaning: "the encoding of the file, by its name on the web, such as `\"windows-1252\"` or \
+                  `\"utf-16le\"` (default: UTF-8, or what a byte order mark says)",
     },
     Key {
         name: "group",
         meaning: "name of the CSV column that holds the group name (bone, patient, site) of each \
-                  velocity; at most 1000 groups, see [below](#groups-of-velocities)",
+                  velocity, or a list of up to 5 columns, whose names are joined by ` / `; at most 1000 \
+                  groups, see [below](#groups-of-velocities)",
     },
     Key {
         name: "subject",
@@ -98,21 +128,21 @@ pub(super) fn read(
     kind: JobKind,
 ) -> (Option<Data>, Option<Origin>) {
     let mut origin = None;
-    let data = given(reader, root, kind, |path, named| {
-        let (measurements, stands) = from_file(&directory.join(path), named)?;
+    let data = given(reader, root, kind, |path, named, format| {
+        let (measurements, stands) = from_file(&directory.join(path), named, format)?;
         origin = Some(stands);
         Ok(measurements)
     });
     (data, origin)
 }
 
-/// Returns the measured data; those in a file are read by `from_file`, given its name and the named
-/// columns.
+/// Returns the measured data; those in a file are read by `from_file`, given its name, the named
+/// columns and how it is written.
 fn given(
     reader: &mut Reader,
     root: &Table<'_>,
     kind: JobKind,
-    from_file: impl FnOnce(&str, NamedColumns<'_>) -> Result<Measurements, Vec<CsvError>>,
+    from_file: impl FnOnce(&str, &NamedColumns<'_>, &CsvFormat) -> Result<Measurements, Vec<CsvError>>,
 ) -> Option<Data> {
     let table = reader.table(root, "data", &KEYS.map(|key| key.name));
     if !table.is_table() {
@@ -158,10 +188,10 @@ fn given(
 /// Records keys that say nothing about data of this form.
 fn unneeded(reader: &mut Reader, table: &Table<'_>, has_moments: bool) {
     let has_velocities = table.has("velocities");
-    for key in ["group", "subject", "decay", "known"].into_iter().filter(|key| table.has(key)) {
+    let of_a_file = OF_A_FILE.iter().map(|(key, _)| *key).chain(FORMAT_KEYS);
+    for key in of_a_file.filter(|key| table.has(key)) {
         if !has_velocities {
-            let message =
-                "names a column of the file of velocities, and there is none; give `velocities`";
+            let message = "is about the file of velocities, and there is none; give `velocities`";
             reader.lacks(&table.path(key), &[table.path("velocities")], message);
         }
     }
@@ -274,6 +304,8 @@ const OF_A_FILE: [(&str, &str); 4] = [
         "names a column of a file, but velocities is a list; give the name of a CSV file, or the list `decays`",
     ),
 ];
+/// Keys that say how a file of velocities is written.
+const FORMAT_KEYS: [&str; 6] = ["column", "unit", "separator", "decimal", "missing", "encoding"];
 /// Keys that belong to a list of velocities, and what is wrong with each beside a file.
 const OF_A_LIST: [(&str, &str); 2] = [
     (
@@ -299,14 +331,22 @@ fn velocities(
     reader: &mut Reader,
     table: &Table<'_>,
     kind: JobKind,
-    from_file: impl FnOnce(&str, NamedColumns<'_>) -> Result<Measurements, Vec<CsvError>>,
+    from_file: impl FnOnce(&str, &NamedColumns<'_>, &CsvFormat) -> Result<Measurements, Vec<CsvError>>,
 ) -> Option<Measurements> {
     let path = table.path("velocities");
-    let [group, subject, decay] =
-        ["group", "subject", "decay"].map(|key| column(reader, table, key));
+    let group = group_columns(reader, table);
+    let [subject, decay] = ["subject", "decay"].map(|key| column(reader, table, key));
     let known = known_columns(reader, table);
+    let format = csv_format::read(reader, table);
     match &table.get("velocities")?.value {
         Value::List(_) if has_misplaced(reader, table, &OF_A_FILE) => None,
+        Value::List(_) if FORMAT_KEYS.iter().any(|key| table.has(key)) => {
+            for key in FORMAT_KEYS.into_iter().filter(|key| table.has(key)) {
+                let message = "says how a file is written, but velocities is a list; leave it out";
+                reader.violations.add(table.path(key), message);
+            }
+            None
+        }
         Value::List(elements) => {
             let (subjects, decays) = (subjects(reader, table), decays(reader, table));
             let velocities = reader.numbers(&path, elements)?;
@@ -320,21 +360,42 @@ fn velocities(
             None
         }
         Value::Text(_) if kind == JobKind::Propagation => None,
-        Value::Text(name) => match from_file(name, NamedColumns { group, subject, decay, known }) {
-            Ok(data) => Some(data),
-            Err(problems) => {
-                for problem in problems {
-                    if problem.stands_for_more() {
-                        reader.violations.add_more(&path, problem.to_string());
-                    } else {
-                        reader.violations.add(&path, problem.to_string());
-                    }
-                }
-                None
-            }
-        },
+        Value::Text(name) => {
+            let named = NamedColumns { group: group?, subject, decay, known };
+            let data = from_file(name, &named, &format?);
+            data.map_err(|problems| record(reader, &path, &problems)).ok()
+        }
         other => {
             reader.wrong_type(path, "the name of a CSV file, or a list of numbers (m/s)", other);
+            None
+        }
+    }
+}
+
+fn record(reader: &mut Reader, path: &str, problems: &[CsvError]) {
+    for problem in problems {
+        if problem.stands_for_more() {
+            reader.violations.add_more(path, problem.to_string());
+        } else {
+            reader.violations.add(path, problem.to_string());
+        }
+    }
+}
+
+/// Maximum number of columns that name a group together.
+pub(super) const GROUP_COLUMNS_MAX: usize = 5;
+
+/// Returns the columns of the groups' names; `None` if the key is wrong.
+fn group_columns<'a>(reader: &mut Reader, table: &Table<'a>) -> Option<Vec<&'a str>> {
+    let Some(node) = table.get("group") else { return Some(Vec::new()) };
+    let expected = "the name of a column of the file of velocities, or a list of 1 to 5 of them";
+    match &node.value {
+        Value::Text(column) => Some(vec![column]),
+        Value::List(columns) if (1..=GROUP_COLUMNS_MAX).contains(&columns.len()) => {
+            reader.texts(&table.path("group"), columns)
+        }
+        other => {
+            reader.wrong_type(table.path("group"), expected, other);
             None
         }
     }
@@ -364,12 +425,13 @@ fn column<'a>(reader: &mut Reader, table: &Table<'a>, key: &str) -> Option<&'a s
 
 fn from_file(
     path: &Path,
-    named: NamedColumns<'_>,
+    named: &NamedColumns<'_>,
+    format: &CsvFormat,
 ) -> Result<(Measurements, Origin), Vec<CsvError>> {
-    let Measured { data: mut groups, origin } = velocities::read(path, named)?;
-    let measurements = match (named.group, groups.pop()) {
+    let Measured { data: mut groups, origin } = velocities::read(path, named, format)?;
+    let measurements = match (named.group.is_empty(), groups.pop()) {
         // Without a column of groups all velocities are in one.
-        (None, Some(Group { velocities, subjects, decays, .. })) => {
+        (true, Some(Group { velocities, subjects, decays, .. })) => {
             Measurements::Velocities { velocities, subjects, decays }
         }
         (_, last) => {

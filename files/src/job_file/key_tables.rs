@@ -37,8 +37,9 @@ pub fn job_table() -> String {
     let mut settings = RunSettings::default();
     let declared = settings.sections().map(|(key, section)| rows(key.name, &entries(section)));
     table(&format!(
-        "{}{}{}{}{}{}{}{}",
+        "{}{}{}{}{}{}{}{}{}",
         special("data", &data_section::KEYS),
+        special("parameters", &[parameters::MATERIAL]),
         row("parameters.NAME", "", "", &each),
         special("parameters.NAME", &parameters::KEYS),
         declared.concat(),

@@ -1,12 +1,11 @@
 //! `[parameters]`: the range of each parameter.
 
-use std::slice;
-
 use osteon_common::case::Setup;
 use osteon_common::fields::Key;
 use osteon_common::job::Range;
 use osteon_common::parameters::{PARAMETERS, Parameter};
 
+use crate::materials::{self, Base};
 use crate::reader::{Reader, Table};
 
 /// The keys of a range.
@@ -19,10 +18,18 @@ pub(super) const KEYS: [Key; 3] = [
     Key { name: "fixed", meaning: "instead of both: the value of a parameter that is held fixed" },
 ];
 
+/// The key that stands in for ranges.
+pub(super) const MATERIAL: Key = Key {
+    name: materials::KEY,
+    meaning: "name of a material (`osteon materials` lists them): parameters that are left out are fixed at its values, and those with `bounds` alone start there; the dispersion must be given",
+};
+
 /// Returns the ranges. If one is missing or wrong, this is recorded, and the range has no meaning.
 /// Parameters of the setup start at its values, unless a start is given.
 pub(super) fn read(reader: &mut Reader, root: &Table<'_>, setup: &Setup) -> [Range; PARAMETERS] {
-    let table = reader.table(root, "parameters", &Parameter::ALL.map(Parameter::name));
+    let mut keys = vec![MATERIAL.name];
+    keys.extend(Parameter::ALL.map(Parameter::name));
+    let table = reader.table(root, "parameters", &keys);
     if !table.is_table() {
         if !root.has("parameters") {
             let names = Parameter::OF_BONE.map(Parameter::name).join(", ");
@@ -31,37 +38,52 @@ pub(super) fn read(reader: &mut Reader, root: &Table<'_>, setup: &Setup) -> [Ran
         }
         return [UNKNOWN; PARAMETERS];
     }
+    let base = Base::read(reader, &table);
     Parameter::ALL.map(|parameter| match parameter.of_setup() {
         Some(quantity) => searched(reader, &table, parameter, quantity.of(setup)),
-        None => range(reader, &table, parameter),
+        None => range(reader, &table, parameter, base),
     })
 }
 
 /// Placeholder for a range that could not be read; a violation is always recorded with it.
 const UNKNOWN: Range = Range::Fixed(f64::NAN);
 
-/// Reads a range; numbers that cannot be read are recorded and become NaN.
-fn range(reader: &mut Reader, parameters: &Table<'_>, parameter: Parameter) -> Range {
+/// Reads a range, for which a material can stand in; numbers that cannot be read are recorded and
+/// become NaN.
+fn range(reader: &mut Reader, parameters: &Table<'_>, parameter: Parameter, base: Base) -> Range {
+    let of_material = base.value(parameter);
     let key = parameter.name();
     let table = reader.table(parameters, key, &KEYS.map(|key| key.name));
     let path = parameters.path(key);
     if !table.is_table() {
+        if let (false, Some(value)) = (parameters.has(key), of_material) {
+            return Range::Fixed(value);
+        }
         if !parameters.has(key) {
-            reader.lacks(&path, slice::from_ref(&path), format!("is missing; {RANGE_FORMS}"));
+            let mut cures = vec![path.clone()];
+            if parameter != Parameter::Dispersion {
+                cures.push(parameters.path(MATERIAL.name));
+            }
+            reader.lacks(&path, &cures, format!("is missing; {RANGE_FORMS}"));
         }
         return UNKNOWN;
     }
     match (table.has("fixed"), table.has("start") || table.has("bounds")) {
         (true, false) => Range::Fixed(reader.number(&table, "fixed").unwrap_or(f64::NAN)),
         (false, true) => {
-            if !table.has("start") {
+            if !table.has("start") && of_material.is_none() {
                 reader.missing(&table, "start", format_args!("within the bounds; {RANGE_FORMS}"));
             }
             if !table.has("bounds") {
                 reader.missing(&table, "bounds", format_args!("[lower, upper]; {RANGE_FORMS}"));
             }
-            let start = reader.number(&table, "start").unwrap_or(f64::NAN);
             let [lower, upper] = bounds(reader, &table).unwrap_or([f64::NAN; 2]);
+            let start = match (table.has("start"), base) {
+                (true, _) => reader.number(&table, "start"),
+                (false, Base::Unknown) => Some(lower),
+                (false, _) => of_material,
+            };
+            let start = start.unwrap_or(f64::NAN);
             Range::Free { start, lower, upper }
         }
         (true, true) => {

@@ -2,12 +2,17 @@
 
 use osteon_common::case::Setup;
 use osteon_common::check::{COUNT, DECAY, REPEATABILITY};
-use osteon_common::fields::{DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
+use osteon_common::fields::{Choice, DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::parameters::Parameter;
 use serde_json::{Map, Value as Json, json};
 
+use crate::materials;
+
+use super::csv_format::MISSING_MAX;
+use super::data_section::GROUP_COLUMNS_MAX;
 use super::{data_section, parameters, posterior, priors};
+use crate::velocities::{DecimalMark, Separator, VelocityUnit};
 
 /// Returns the JSON Schema (draft 2020-12) of a job file in TOML or JSON, with a final newline. It
 /// states names, types and ranges; relations between keys are checked when a file is read.
@@ -126,10 +131,20 @@ fn data() -> Json {
     let columns = object(known(&column).into_iter().collect::<Map<_, _>>().into());
     group["required"] = json!(["velocities"]);
     let group = json!({ "anyOf": [list(), group] });
+    let choice = |choice: &dyn Choice| json!({ "enum": choice.names(), "default": choice.name() });
+    let texts = |most: usize| json!({ "type": "array", "items": name(), "maxItems": most });
+    let mut group_columns = texts(GROUP_COLUMNS_MAX);
+    group_columns["minItems"] = 1.into();
     // In the order of the keys.
     let types: [Json; data_section::KEYS.len()] = [
         json!({ "anyOf": [name(), list()] }),
         name(),
+        choice(&VelocityUnit::default()),
+        choice(&Separator::default()),
+        choice(&DecimalMark::default()),
+        texts(MISSING_MAX),
+        name(),
+        json!({ "anyOf": [name(), group_columns] }),
         name(),
         name(),
         columns,
@@ -154,7 +169,13 @@ fn each_parameter(schema: fn(Parameter) -> Json) -> Json {
 
 fn ranges() -> Json {
     let mut ranges = object(each_parameter(range));
-    ranges["required"] = Parameter::OF_BONE.map(Parameter::name).to_vec().into();
+    let material = described(json!({ "enum": materials::NAMES }), parameters::MATERIAL);
+    ranges["properties"][parameters::MATERIAL.name] = material;
+    ranges["required"] = json!([Parameter::Dispersion.name()]);
+    ranges["anyOf"] = json!([
+        { "required": [parameters::MATERIAL.name] },
+        { "required": Parameter::OF_BONE.map(Parameter::name) },
+    ]);
     ranges
 }
 
@@ -174,8 +195,8 @@ fn range(parameter: Parameter) -> Json {
         range["required"] = json!([bounds.0]);
         range
     } else {
-        let required =
-            [json!({ "required": [start.0, bounds.0] }), json!({ "required": [fixed.0] })];
+        // With a material, `bounds` alone are enough.
+        let required = [json!({ "required": [bounds.0] }), json!({ "required": [fixed.0] })];
         let mut range = object(json!({ start.0: start.1, bounds.0: bounds.1, fixed.0: fixed.1 }));
         range["oneOf"] = required.to_vec().into();
         range

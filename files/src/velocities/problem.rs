@@ -1,19 +1,57 @@
 //! Faults of a CSV file of velocities, and of its lines.
 
-use std::io;
+use std::{fmt, io};
 
 use osteon_common::check::VELOCITY;
 use osteon_common::{limits, visible};
 use thiserror::Error;
+
+use super::csv_format::{DecimalMark, Separator};
 
 /// The column of the velocities.
 pub(super) const COLUMN: &str = "velocity";
 /// Maximum number of characters of a file's text that a message quotes.
 const SHOWN_CHARACTERS_MAX: usize = 60;
 
+/// How to read a file that is not written as expected, at the end of a message.
+#[derive(Debug)]
+pub(crate) enum CsvHint {
+    None,
+    Separator(Separator),
+    Column(String),
+    Decimal(DecimalMark),
+    Missing(String),
+    QuotedDecimal,
+}
+
+impl fmt::Display for CsvHint {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::None => Ok(()),
+            Self::Separator(separator) => {
+                write!(formatter, "; if its fields are separated so: [data] separator = {:?}", separator.name())
+            }
+            Self::Column(name) => {
+                write!(formatter, "; if those are the velocities: [data] column = {name:?}")
+            }
+            Self::Decimal(mark) => {
+                write!(formatter, " (if that is a decimal mark: [data] decimal = {:?})", mark.name())
+            }
+            Self::Missing(text) => write!(
+                formatter,
+                " (if that stands for a missing value: [data] missing = [{text:?}])"
+            ),
+            Self::QuotedDecimal => formatter.write_str(
+                " (if numbers have decimal commas: quote them, or separate fields by semicolons, and give \
+                 [data] decimal = \",\")",
+            ),
+        }
+    }
+}
+
 /// A fault. Its message completes a sentence that begins with the file or the line.
 #[derive(Debug, Error)]
-pub(super) enum Problem {
+pub(crate) enum Problem {
     #[error("cannot be read: {0} (its path is relative to the job file)")]
     Unreadable(io::Error),
     #[error("is longer than {} bytes", limits::FILE_BYTES_MAX)]
@@ -23,14 +61,17 @@ pub(super) enum Problem {
         limits::LINE_BYTES_MAX
     )]
     LongLine,
-    #[error("is not UTF-8 text")]
+    #[error(
+        "is not UTF-8 text; give its encoding: [data] encoding = \"windows-1252\" (Western Europe, Latin-1), \
+         \"utf-16le\", … or save it as UTF-8"
+    )]
     NotUtf8,
     #[error("has no header; its first line must name the columns, one of them `{COLUMN}`")]
     Empty,
     #[error("is not a header; it must name the columns, one of them `{COLUMN}`")]
     NoHeader,
-    #[error("no column `{column}`; the header has {columns}")]
-    NoColumn { column: String, columns: String },
+    #[error("no column `{column}`; the header has {columns}{hint}")]
+    NoColumn { column: String, columns: String, hint: CsvHint },
     #[error("the header has the column `{column}` twice")]
     RepeatedColumn { column: String },
     #[error("{column} is empty; it must name the {named} of the velocity")]
@@ -58,14 +99,17 @@ pub(super) enum Problem {
     NoVariation { column: String },
     #[error("has more than {} groups", limits::GROUPS_MAX)]
     TooManyGroups,
-    #[error("the number of fields is {found}; the header has {expected}")]
-    FieldCount { found: usize, expected: usize },
+    #[error("the number of fields is {found}; the header has {expected}{hint}")]
+    FieldCount { found: usize, expected: usize, hint: CsvHint },
     #[error("a quote is not closed, or stands inside a field")]
     Quote,
-    #[error("velocity is empty; it must be a number above 0 (m/s)")]
+    #[error(
+        "velocity is empty; it must be a number above 0 (to leave out rows without one: [data] missing = \
+         [\"\"])"
+    )]
     NoNumber,
-    #[error("velocity is {found:?}; it must be a number above 0 (m/s)")]
-    NotANumber { found: String },
+    #[error("velocity is {found:?}; it must be a number above 0{hint}")]
+    NotANumber { found: String, hint: CsvHint },
     #[error("velocity {}", VELOCITY.refusal(*.found))]
     Refused { found: f64 },
     #[error("has no rows; a coefficient of variation needs at least two velocities")]

@@ -24,7 +24,7 @@ pub(super) fn glued(text: &str) -> String {
 
 /// Wraps the lines of `text` between words, with a final newline; continuation lines are indented.
 /// A word that is longer than a line, such as a path, is not broken.
-pub(super) fn wrapped(text: &str) -> String {
+pub(crate) fn wrapped(text: &str) -> String {
     let lines = text.lines().flat_map(|line| {
         words(&visible::line(line), WIDTH, WIDTH - INDENT).into_iter().enumerate()
     });

@@ -1,0 +1,101 @@
+"""Measures what Python adds: the velocities of 1,000 tensors a call by `osteon.velocities`, and by a
+program in Rust (bulk.rs) that is sent the same tensors; and the time of `import osteon`.
+
+Both sides compute in turns, so that other load of the machine meets both, on one thread and on all cores;
+the smallest and the median time of the rounds are printed. `cargo xtask bench-python` builds both in release
+mode, installs the wheel in a virtual environment, and runs this there."""
+
+import argparse
+import contextlib
+import os
+import pathlib
+import statistics
+import struct
+import subprocess
+import sys
+import time
+
+CASE = pathlib.Path(__file__).resolve().parents[2] / "examples" / "cases" / "A.toml"
+TENSORS = 1000
+MASK = 2**64 - 1
+
+
+@contextlib.contextmanager
+def rust(command, tensors, threads):
+    """The program in Rust, which has got the tensors; a function that runs a round."""
+    words = [*command, CASE, str(threads), str(len(tensors))]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(words, **pipes) as process:
+        process.stdin.write(tensors.tobytes())
+
+        def measured():
+            process.stdin.write(b".")
+            process.stdin.flush()
+            answer = process.stdout.read(16)
+            if len(answer) != 16:
+                sys.exit("the program in Rust ended")
+            return struct.unpack("=dQ", answer)
+
+        yield measured
+        process.stdin.close()
+
+
+def python(tensors, threads):
+    """Seconds of a call, and the sum of the bits of the velocities."""
+    import osteon
+
+    begun = time.perf_counter()
+    found = osteon.velocities(tensors, setup=CASE, threads=threads)
+    seconds = time.perf_counter() - begun
+    return seconds, int(found.view("uint64").sum(dtype="uint64")) & MASK
+
+
+def compare(command, tensors, threads, rounds):
+    """Prints a row: both sides in turns."""
+    times = {"Rust": [], "Python": []}
+    with rust(command, tensors, threads) as measured:
+        # The tables for the tensors are made in the first round of each side, which does not count.
+        for _ in range(rounds + 1):
+            for side, (seconds, bits) in (("Rust", measured()), ("Python", python(tensors, threads))):
+                times[side].append(seconds)
+                if side == "Rust":
+                    expected = bits
+                elif bits != expected:
+                    sys.exit("Rust and Python computed different velocities")
+    least = {side: min(found[1:]) for side, found in times.items()}
+    middle = {side: statistics.median(found[1:]) for side, found in times.items()}
+    added = [100 * (found["Python"] / found["Rust"] - 1) for found in (least, middle)]
+    cells = [f"{1e6 * found[side] / len(tensors):9.1f}" for side in times for found in (least, middle)]
+    print(f"| {threads:7} | {' | '.join(cells)} | {added[0]:+6.2f} % | {added[1]:+6.2f} % |", flush=True)
+
+
+def imported(rounds):
+    """Seconds that `import osteon` adds to the start of Python: the smallest of all rounds."""
+    least = {}
+    for statement in ("pass", "import numpy", "import osteon") * rounds:
+        begun = time.perf_counter()
+        subprocess.run([sys.executable, "-c", statement], check=True)
+        seconds = time.perf_counter() - begun
+        least[statement] = min(seconds, least.get(statement, seconds))
+    return least["import osteon"] - least["pass"], least["import osteon"] - least["import numpy"]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=20, help="how often each side computes (20)")
+    parser.add_argument("command", nargs="+", help="the program in Rust, after --")
+    arguments = parser.parse_args()
+    import osteon
+
+    tensors = osteon.ensemble(CASE, dispersion=0.1, seed=1).draw(TENSORS)
+    print(f"{TENSORS} tensors a call, µs a tensor, {arguments.rounds} rounds in turns\n")
+    print("| threads | Rust, least | median | Python, least | median | added, least | median |")
+    print("|---|---|---|---|---|---|---|")
+    for threads in sorted({1, len(os.sched_getaffinity(0))}):
+        compare(arguments.command, tensors, threads, arguments.rounds)
+    whole, beyond = imported(arguments.rounds)
+    print(f"\nimport osteon: {whole:.3f} s, of which {beyond:.3f} s beyond NumPy's")
+
+
+if __name__ == "__main__":
+    main()

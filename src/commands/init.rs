@@ -1,0 +1,83 @@
+//! `init`: a first job file for a CSV file of velocities.
+
+use std::path::{Path, PathBuf, absolute};
+
+use anyhow::{Context as _, anyhow};
+use osteon_common::job::JobKind;
+use osteon_common::visible;
+use osteon_files::init::FirstJob;
+use osteon_files::{init, job_file};
+
+use crate::arguments::InitArguments;
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
+use crate::new_files::{self, NewFile};
+use crate::output;
+use crate::resolved::OutputFormat;
+
+/// Job file without data, if no path is given.
+const UNNAMED: &str = "job.toml";
+
+/// Writes the job file, says what was understood, and whether the job can be run as it is.
+pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFailure> {
+    let InitArguments { velocities, out } = arguments;
+    let is_printed = out.as_deref() == Some(Path::new("-"));
+    let path = match (out, velocities) {
+        (Some(path), _) => path.clone(),
+        (None, Some(csv)) => csv.with_extension("toml"),
+        (None, None) => PathBuf::from(UNNAMED),
+    };
+    if !is_printed {
+        new_files::refuse_existing(&path)?;
+    }
+    let first = match velocities {
+        Some(csv) => {
+            let beside = if is_printed { Path::new(UNNAMED) } else { path.as_path() };
+            let name = name_from(csv, beside).map_err(CommandFailure::bad_input)?;
+            init::of_csv(csv, &name).map_err(CommandFailure::bad_input)?
+        }
+        None => FirstJob { text: init::without_data(), understood: Vec::new() },
+    };
+    let mut stdout = output::stdout(OutputFormat::Text);
+    if is_printed {
+        stdout.verbatim(&first.text).map_err(stdout_failure)?;
+        return Ok(ExitStatus::Done);
+    }
+    new_files::create(&[NewFile { path: path.clone(), text: first.text, secret: false }])?;
+    let mut said = String::new();
+    if let Some(csv) = velocities {
+        said += &format!("{}\n", visible::path(csv));
+        for sentence in &first.understood {
+            said += &format!("  {sentence}\n");
+        }
+    }
+    let shown = visible::path(&path);
+    said += &format!("wrote {shown}; next:\n");
+    said += "  set the geometry of your device, and what you know of the bone, in that file\n";
+    said += &format!("  osteon check {shown}\n  osteon identify {shown}\n");
+    stdout.verbatim(&said).map_err(stdout_failure)?;
+    // What is wrong with the values themselves is said now rather than at the first run.
+    if velocities.is_some() {
+        let job = job_file::read_with_warnings(&path, JobKind::Identification);
+        job.map_err(|error| {
+            CommandFailure::bad_input(
+                anyhow!(error).context(format!("{shown} was written, but cannot be run yet")),
+            )
+        })?;
+    }
+    Ok(ExitStatus::Done)
+}
+
+/// Returns the name of a CSV file as a job file at `job` has to write it: relative to its directory if the
+/// file is in it or below, and absolute otherwise.
+fn name_from(csv: &Path, job: &Path) -> anyhow::Result<String> {
+    let complete = |path: &Path| {
+        absolute(path).with_context(|| format!("{} has no absolute path", visible::path(path)))
+    };
+    let (csv, job) = (complete(csv)?, complete(job)?);
+    let directory = job.parent().unwrap_or(Path::new("/"));
+    let name = csv.strip_prefix(directory).unwrap_or(&csv);
+    let name = name.to_str().ok_or_else(|| {
+        anyhow!("{} is not UTF-8; rename the file, as a job file is UTF-8", visible::path(name))
+    })?;
+    Ok(name.to_owned())
+}
