@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tokio::task::JoinSet;
 
 use super::functions::{ModelValue, ServedJob};
-use super::model::Model;
+use super::model::ServedModel;
 use super::protocol_error::ProtocolError;
 use super::request_config::RequestConfig;
 
@@ -17,7 +17,7 @@ const STEP: f64 = 1e-3;
 #[derive(Debug, Clone)]
 pub(super) struct Differentiated {
     pub(super) served: Arc<ServedJob>,
-    pub(super) model: Model,
+    pub(super) model: ServedModel,
     pub(super) config: RequestConfig,
     pub(super) input: Vec<f64>,
 }
@@ -64,7 +64,7 @@ impl Differentiated {
             (above, below) => match (self.at(self.input.clone()).await?, above, below) {
                 (Some(here), Some(above), _) => Ok(slope(&above, &here, step)),
                 (Some(here), None, Some(below)) => Ok(slope(&here, &below, step)),
-                (_, _, _) if self.model == Model::Posterior => Ok(vec![0.0]),
+                (_, _, _) if self.model == ServedModel::Posterior => Ok(vec![0.0]),
                 (None, _, _) => Err(self.refusal().await),
                 (Some(_), None, None) => Err(ProtocolError::output(format!(
                     "the model has no derivative here: it is not defined at a distance of {step:?} \

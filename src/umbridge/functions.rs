@@ -14,7 +14,7 @@ use tokio::sync::OnceCell;
 use super::deterministic::CaseSolver;
 use super::evaluator::{Evaluator, PointResult, counted};
 use super::input_space::{InputScale, InputSpace};
-use super::model::Model;
+use super::model::ServedModel;
 use super::protocol_error::{ProtocolError, quoted};
 use super::request_config::RequestConfig;
 
@@ -67,32 +67,32 @@ impl ServedJob {
 
     /// Returns the names of the models.
     pub(crate) fn models(&self) -> Vec<&'static str> {
-        Model::offered(self.has_posterior).map(Model::name).collect()
+        ServedModel::offered(self.has_posterior).map(ServedModel::name).collect()
     }
 
     /// Returns the model of this name.
-    pub(super) fn model(&self, name: &str) -> Result<Model, ProtocolError> {
-        Model::named(name, self.has_posterior)
+    pub(super) fn model(&self, name: &str) -> Result<ServedModel, ProtocolError> {
+        ServedModel::named(name, self.has_posterior)
     }
 
     /// Returns the length of a model's input.
-    pub(super) fn inputs(&self, model: Model) -> usize {
+    pub(super) fn inputs(&self, model: ServedModel) -> usize {
         model.parameters(&self.specification).len()
     }
 
     /// Returns the space of a request's input.
     pub(super) fn space(
         &self,
-        model: Model,
+        model: ServedModel,
         config: &RequestConfig,
     ) -> Result<InputSpace<'_>, ProtocolError> {
         let scale = match model {
-            Model::ForwardSi => InputScale::Si,
+            ServedModel::ForwardSi => InputScale::Si,
             _ => config.inputs.unwrap_or(InputScale::Multiples),
         };
         let parameters = model.parameters(&self.specification);
         let base = match model {
-            Model::Posterior => self.specification.start_of(self.set(config)?),
+            ServedModel::Posterior => self.specification.start_of(self.set(config)?),
             _ => self.specification.start(),
         };
         Ok(InputSpace::new(&self.specification, base, parameters, scale))
@@ -101,12 +101,12 @@ impl ServedJob {
     /// Returns the value of a model at an input; that of the posterior is the floor where it has none.
     pub(super) async fn value(
         &self,
-        model: Model,
+        model: ServedModel,
         config: &RequestConfig,
         input: &[f64],
     ) -> Result<ModelValue, ProtocolError> {
         match self.value_within(model, config, input).await {
-            Err(error) if error.no_value && model == Model::Posterior => {
+            Err(error) if error.no_value && model == ServedModel::Posterior => {
                 Ok(ModelValue { output: vec![FLOOR], notes: Vec::new() })
             }
             found => found,
@@ -119,25 +119,25 @@ impl ServedJob {
     /// If it has none: [`ProtocolError::no_value`]; or if it cannot be computed.
     pub(super) async fn value_within(
         &self,
-        model: Model,
+        model: ServedModel,
         config: &RequestConfig,
         input: &[f64],
     ) -> Result<ModelValue, ProtocolError> {
         let space = self.space(model, config)?;
         let point = space.point(input);
         match model {
-            Model::Forward | Model::ForwardSi => {
+            ServedModel::Forward | ServedModel::ForwardSi => {
                 let result = self.evaluated(&space, &point, config).await?;
                 let Moments { mean, coefficient_of_variation } = result.velocity.moments;
                 let output = vec![mean, coefficient_of_variation];
                 Ok(ModelValue { output, notes: self.notes(&point, result) })
             }
-            Model::Velocity => {
+            ServedModel::Velocity => {
                 space.propagation(&point, (None, None))?;
                 let velocity = self.cases.velocity(&point, &self.specification.setup).await?;
                 Ok(ModelValue { output: vec![velocity], notes: Vec::new() })
             }
-            Model::Posterior => {
+            ServedModel::Posterior => {
                 let density = self.density(&space, config).await?;
                 let outside = || ProtocolError {
                     no_value: true,

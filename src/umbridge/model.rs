@@ -7,7 +7,7 @@ use super::protocol_error::{ProtocolError, ProtocolErrorKind, quoted};
 
 /// A function of the job's parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Model {
+pub(super) enum ServedModel {
     /// Mean and coefficient of variation of the velocity, by multiples of the job's values.
     Forward,
     /// The same, by values in SI units.
@@ -18,7 +18,7 @@ pub(super) enum Model {
     Posterior,
 }
 
-impl Model {
+impl ServedModel {
     /// All models, in the order in which they are listed.
     const ALL: [Self; 4] = [Self::Forward, Self::ForwardSi, Self::Velocity, Self::Posterior];
 

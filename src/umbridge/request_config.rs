@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::input_space::InputScale;
-use super::model::Model;
+use super::model::ServedModel;
 use super::protocol_error::{ProtocolError, quoted};
 
 /// Settings of one request.
@@ -25,7 +25,7 @@ impl RequestConfig {
     ///
     /// # Errors
     /// If a key is unknown, of no use for the model, or has another value than those allowed.
-    pub(super) fn read(model: Model, value: Option<&Value>) -> Result<Self, ProtocolError> {
+    pub(super) fn read(model: ServedModel, value: Option<&Value>) -> Result<Self, ProtocolError> {
         let mut config = Self::default();
         let fields = match value {
             None | Some(Value::Null) => return Ok(config),
@@ -56,19 +56,19 @@ impl RequestConfig {
 }
 
 /// Returns the keys that a model has.
-fn keys(model: Model) -> &'static [&'static str] {
+fn keys(model: ServedModel) -> &'static [&'static str] {
     match model {
-        Model::Forward | Model::ForwardSi => &["seed", "realizations"],
-        Model::Velocity => &["inputs"],
-        Model::Posterior => &["seed", "realizations", "inputs", "group"],
+        ServedModel::Forward | ServedModel::ForwardSi => &["seed", "realizations"],
+        ServedModel::Velocity => &["inputs"],
+        ServedModel::Posterior => &["seed", "realizations", "inputs", "group"],
     }
 }
 
-fn scale(model: Model, value: &Value) -> Result<InputScale, ProtocolError> {
+fn scale(model: ServedModel, value: &Value) -> Result<InputScale, ProtocolError> {
     let name = text("inputs", value)?;
     let allowed = InputScale::ALL
         .into_iter()
-        .filter(|scale| model == Model::Posterior || *scale != InputScale::Bounds);
+        .filter(|scale| model == ServedModel::Posterior || *scale != InputScale::Bounds);
     let found = allowed.clone().find(|scale| scale.name() == name);
     found.ok_or_else(|| {
         let names: Vec<String> = allowed.map(|scale| format!("{:?}", scale.name())).collect();
@@ -103,7 +103,7 @@ mod tests {
             RequestConfig::read(model, Some(&value)).map_err(|error| error.message)
         };
         for none in [json!({}), json!([]), Value::Null] {
-            assert_eq!(read(Model::Forward, none), Ok(RequestConfig::default()));
+            assert_eq!(read(ServedModel::Forward, none), Ok(RequestConfig::default()));
         }
         let all = json!({"seed": 7, "realizations": 20, "inputs": "bounds", "group": "left"});
         let expected = RequestConfig {
@@ -112,19 +112,27 @@ mod tests {
             inputs: Some(InputScale::Bounds),
             group: Some("left".to_owned()),
         };
-        assert_eq!(read(Model::Posterior, all), Ok(expected));
+        assert_eq!(read(ServedModel::Posterior, all), Ok(expected));
         for (model, config, expected) in [
             (
-                Model::Forward,
+                ServedModel::Forward,
                 json!({"level": 1}),
                 "config.\"level\" is not a key of the model \"forward\"; its keys are: seed, realizations",
             ),
-            (Model::Velocity, json!({"seed": 1}), "its keys are: inputs"),
-            (Model::Velocity, json!({"inputs": "bounds"}), "it must be \"multiples\" or \"si\""),
-            (Model::Posterior, json!({"inputs": 1}), "config.inputs is not a text"),
-            (Model::Posterior, json!({"seed": -1}), "config.seed is not a whole number"),
-            (Model::Posterior, json!({"realizations": 2.5}), "config.realizations is not a whole"),
-            (Model::Posterior, json!("seed"), "config is not an object"),
+            (ServedModel::Velocity, json!({"seed": 1}), "its keys are: inputs"),
+            (
+                ServedModel::Velocity,
+                json!({"inputs": "bounds"}),
+                "it must be \"multiples\" or \"si\"",
+            ),
+            (ServedModel::Posterior, json!({"inputs": 1}), "config.inputs is not a text"),
+            (ServedModel::Posterior, json!({"seed": -1}), "config.seed is not a whole number"),
+            (
+                ServedModel::Posterior,
+                json!({"realizations": 2.5}),
+                "config.realizations is not a whole",
+            ),
+            (ServedModel::Posterior, json!("seed"), "config is not an object"),
         ] {
             let message = read(model, config).unwrap_err();
             assert!(message.contains(expected), "{message}");

@@ -16,7 +16,7 @@ use tokio::time::timeout;
 
 use super::derivatives::Differentiated;
 use super::functions::ServedJob;
-use super::model::Model;
+use super::model::ServedModel;
 use super::protocol_error::{ProtocolError, ProtocolErrorKind, quoted};
 use super::request_config::RequestConfig;
 use super::request_fields::RequestFields;
@@ -41,7 +41,7 @@ enum Operation {
 }
 
 /// An answer: its JSON, and names and values of its own headers.
-type Answer = (Value, Vec<(&'static str, String)>);
+type JsonAnswer = (Value, Vec<(&'static str, String)>);
 
 impl Operation {
     const ALL: [Self; 7] = [
@@ -67,7 +67,11 @@ impl Operation {
     }
 
     /// Answers a request. The name is looked at before everything else.
-    async fn answer(self, served: Arc<ServedJob>, body: &[u8]) -> Result<Answer, ProtocolError> {
+    async fn answer(
+        self,
+        served: Arc<ServedJob>,
+        body: &[u8],
+    ) -> Result<JsonAnswer, ProtocolError> {
         let fields = RequestFields::parse(body)?;
         let model = served.model(fields.name()?)?;
         let size = served.inputs(model);
@@ -111,7 +115,7 @@ impl Operation {
 /// Reads what `Gradient` and `ApplyJacobian` have in common.
 fn differentiated(
     served: Arc<ServedJob>,
-    model: Model,
+    model: ServedModel,
     fields: &RequestFields,
 ) -> Result<Differentiated, ProtocolError> {
     fields.only_index("outWrt")?;
@@ -181,7 +185,7 @@ async fn body(body: Body) -> Result<Bytes, ProtocolError> {
     }
 }
 
-fn response(answer: Result<Answer, ProtocolError>) -> Response {
+fn response(answer: Result<JsonAnswer, ProtocolError>) -> Response {
     let (status, value, notes) = match answer {
         Ok((value, notes)) => (StatusCode::OK, value, notes),
         Err(ProtocolError { kind, status, message, .. }) => {
