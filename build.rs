@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// Files and directories of the program's source. A change in any of them runs this script again, so
 /// that it notices a modified tree.
-const SOURCES: [&str; 22] = [
+const SOURCES: [&str; 24] = [
     ".cargo",
     "Cargo.lock",
     "Cargo.toml",
@@ -22,6 +22,8 @@ const SOURCES: [&str; 22] = [
     "proto/build.rs",
     "proto/osteon",
     "proto/src",
+    "report/Cargo.toml",
+    "report/src",
     "rust-toolchain.toml",
     "search/Cargo.toml",
     "search/src",

@@ -3,6 +3,7 @@
 mod check;
 mod operators;
 mod realizations;
+mod report;
 mod services;
 mod slurm;
 
@@ -17,6 +18,7 @@ use crate::program;
 pub(crate) use check::CheckArguments;
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
+pub(crate) use report::ReportArguments;
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use slurm::{
     AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
@@ -49,6 +51,8 @@ pub(crate) enum Command {
     Draw(DrawArguments),
     /// Compute all observables of a job's realizations: velocities, decay, frequency
     Observe(ObserveArguments),
+    /// Write a report of results: a page for a browser, figures as SVG, their numbers as CSV
+    Report(ReportArguments),
     /// Run a coordinator: accept jobs from clients and distribute them to workers, until interrupted
     Coordinator(CoordinatorArguments),
     /// Run a worker: compute realizations for a coordinator, until interrupted
@@ -116,6 +120,9 @@ pub(crate) struct RunArguments {
     /// results of a complete one
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Also write a report of the results to DIR/report, as `osteon report DIR` does
+    #[arg(long, requires = "out")]
+    pub(crate) report: bool,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -152,6 +159,9 @@ pub(crate) struct SimulateArguments {
     /// the exact method). Each case needs its own directory
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Also write a report of the results to DIR/report, as `osteon report DIR` does
+    #[arg(long, requires = "out")]
+    pub(crate) report: bool,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,

@@ -9,6 +9,7 @@ mod jobs;
 mod materials;
 mod observe;
 mod operators;
+mod report;
 mod run;
 mod scaling;
 mod schema;
@@ -39,6 +40,7 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
             unless_interrupted(check::check(arguments, isa, cores), NOTHING_LEFT).await
         }
         Resolved::Draw(arguments) => draw::draw(&arguments),
+        Resolved::Report(arguments) => report::report(&arguments),
         Resolved::Observe { arguments, isa, threads } => {
             let left = "no file was written";
             unless_interrupted(observe::observe(arguments, isa, threads), left).await

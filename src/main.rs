@@ -22,6 +22,7 @@ mod observations;
 mod output;
 mod program;
 mod progress;
+mod report_directory;
 mod request_id;
 mod resolved;
 mod result_files;

@@ -14,9 +14,9 @@ use osteon_worker::WorkerConfig;
 use crate::arguments::{
     Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
     CredentialArguments, DrawArguments, InitArguments, JobsArguments, JobsCommand, LogFormat,
-    MaterialsArguments, ObserveArguments, ProgressFormat, RunArguments, SchemaArguments,
-    SimulateArguments, SubmitArguments, TokenArguments, WatchArguments, WorkerArguments,
-    WorkersArguments, WorkersCommand,
+    MaterialsArguments, ObserveArguments, ProgressFormat, ReportArguments, RunArguments,
+    SchemaArguments, SimulateArguments, SubmitArguments, TokenArguments, WatchArguments,
+    WorkerArguments, WorkersArguments, WorkersCommand,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
@@ -66,6 +66,8 @@ pub(crate) enum Resolved {
     },
     /// `draw`.
     Draw(DrawArguments),
+    /// `report`.
+    Report(ReportArguments),
     /// `observe`.
     Observe {
         /// The job and the requested output.
@@ -220,6 +222,8 @@ pub(crate) struct Run {
     pub(crate) name: String,
     /// Directory for the results, if they are kept.
     pub(crate) out: Option<PathBuf>,
+    /// Whether a report is written beside them.
+    pub(crate) report: bool,
     /// Output format.
     pub(crate) format: OutputFormat,
     /// Format of the progress.
@@ -272,6 +276,7 @@ impl Resolved {
             Command::Simulate(arguments) => Self::Simulate { arguments, isa: isa()? },
             Command::Check(arguments) => Self::Check { arguments, isa: isa()?, cores },
             Command::Draw(arguments) => Self::Draw(arguments),
+            Command::Report(arguments) => Self::Report(arguments),
             Command::Observe(arguments) => {
                 let threads = arguments.threads.unwrap_or(cores);
                 Self::Observe { arguments, isa: isa()?, threads }
@@ -348,8 +353,18 @@ fn resolve_run(
     cores: u32,
     environment: &Environment,
 ) -> Result<Run, CommandFailure> {
-    let RunArguments { job, workers, threads, coordinator, credentials, name, out, json, progress } =
-        arguments;
+    let RunArguments {
+        job,
+        workers,
+        threads,
+        coordinator,
+        credentials,
+        name,
+        out,
+        report,
+        json,
+        progress,
+    } = arguments;
     let files = CredentialFiles::from(credentials);
     let local = workers.is_some() || threads.is_some();
     let from_environment = coordinator.is_none();
@@ -378,6 +393,7 @@ fn resolve_run(
         location,
         name: name.unwrap_or_default(),
         out,
+        report,
         format: format(json),
         progress,
     })

@@ -130,7 +130,8 @@ fn write_by(
     write().with_context(|| format!("cannot write {}", visible::path(path)))
 }
 
-fn remove_if_there(path: &Path) -> anyhow::Result<()> {
+/// Removes a file, if it is there.
+pub(crate) fn remove_if_there(path: &Path) -> anyhow::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => {
             Err(error).with_context(|| format!("cannot replace {}", visible::path(path)))

@@ -29,11 +29,15 @@ use crate::result_status;
 pub(crate) const JOB: &str = "job.toml";
 /// File of the case to which a directory belongs.
 pub(crate) const CASE: &str = "case.toml";
-const HISTORY: &str = "history.csv";
-const REALIZATIONS: &str = "realizations.csv";
-const POSTERIOR: &str = "posterior.csv";
+/// A table of the results.
+pub(crate) const HISTORY: &str = "history.csv";
+/// A table of the results.
+pub(crate) const REALIZATIONS: &str = "realizations.csv";
+/// A table of the results.
+pub(crate) const POSTERIOR: &str = "posterior.csv";
 const GROUPS: &str = "groups.csv";
-const COMPARISON: &str = "comparison.csv";
+/// A table of the results.
+pub(crate) const COMPARISON: &str = "comparison.csv";
 const LOCK: &str = ".lock";
 const REQUEST: &str = ".request";
 const STORE: &str = "store";

@@ -29,7 +29,7 @@ fn a_spreadsheet_becomes_a_job_that_runs() {
     let csv = scratch.path("clinic.csv");
     fs::write(&csv, spreadsheet()).unwrap();
     let said = run(&["init", text(&csv)]);
-    assert_eq!(said.code(), Some(0), "{}", said.stderr());
+    assert_eq!(said.code, Some(0), "{}", said.stderr);
     let expected = [
         "25 rows of 3 columns: fields separated by semicolons, decimal commas, windows-1252",
         "24 velocities in the column \"FAS (km/s)\" (unit km/s), mean 39",
@@ -39,17 +39,17 @@ fn a_spreadsheet_becomes_a_job_that_runs() {
         "osteon identify",
     ];
     for expected in expected {
-        assert!(said.stdout().contains(expected), "{expected} is not in: {}", said.stdout());
+        assert!(said.stdout.contains(expected), "{expected} is not in: {}", said.stdout);
     }
     let job = scratch.path("clinic.toml");
     let checked = run(&["check", text(&job), "--json"]);
-    assert_eq!(checked.code(), Some(0), "{}", checked.stderr());
+    assert_eq!(checked.code, Some(0), "{}", checked.stderr);
     assert_eq!(checked.json()["sets"], 2);
     let printed = run(&["init", text(&csv), "-o", "-"]);
-    assert!(printed.stdout().starts_with("# Identifies"), "{}", printed.stdout());
+    assert!(printed.stdout.starts_with("# Identifies"), "{}", printed.stdout);
     let again = run(&["init", text(&csv)]);
-    assert_eq!(again.code(), Some(2));
-    assert!(again.stderr().contains("already exists and is not overwritten"), "{}", again.stderr());
+    assert_eq!(again.code, Some(2));
+    assert!(again.stderr.contains("already exists and is not overwritten"), "{}", again.stderr);
 }
 
 #[test]
@@ -57,10 +57,10 @@ fn what_cannot_be_run_yet_is_said_at_once() {
     let scratch = Scratch::new();
     let csv = scratch.write("v.csv", "velocity\n3900\n3950\n39000\n3920\n");
     let said = run(&["init", text(&csv)]);
-    assert_eq!(said.code(), Some(2));
-    assert!(said.stderr().contains("was written, but cannot be run yet"), "{}", said.stderr());
-    assert!(said.stderr().contains("line 4: velocity is 39000.0"), "{}", said.stderr());
+    assert_eq!(said.code, Some(2));
+    assert!(said.stderr.contains("was written, but cannot be run yet"), "{}", said.stderr);
+    assert!(said.stderr.contains("line 4: velocity is 39000.0"), "{}", said.stderr);
     let nothing = run(&["init", text(&scratch.write("w.csv", "a,b\nx,y\n"))]);
-    assert_eq!(nothing.code(), Some(2));
+    assert_eq!(nothing.code, Some(2));
     assert!(!scratch.path("w.toml").exists());
 }

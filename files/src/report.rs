@@ -68,7 +68,7 @@ impl ResultFile {
         match kind.as_str() {
             "identification" => Ok(Self::Identification(parse(text)?)),
             "propagation" => Ok(Self::Propagation(parse(text)?)),
-            _ => Err(ReadError::unknown_kind(&kind)),
+            _ => Err(ReadError::unknown_kind(&kind, "identification or propagation")),
         }
     }
 

@@ -44,7 +44,7 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
 /// [`FORMULA`] character at the beginning or, since some programs take `;` for the end of a field,
 /// after a `;`. It is also put before a `'` in such a place, so that the text is recovered by
 /// removing one `'` there. The field is quoted if necessary.
-pub(crate) fn field(text: &str) -> String {
+pub fn field(text: &str) -> String {
     let mut harmless = String::with_capacity(text.len());
     let mut begins = true;
     for c in text.chars() {

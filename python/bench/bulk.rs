@@ -63,7 +63,6 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Returns how long all velocities took, s, and the sum of their bits.
-#[expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 fn measured(solver: &Solver, bones: &[Bone], threads: usize) -> (f64, u64) {
     let begun = Instant::now();
     let next = AtomicUsize::new(0);

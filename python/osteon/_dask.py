@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import importlib.metadata
 import uuid
 from typing import Any
@@ -61,12 +62,15 @@ class DaskWorkers:
         self._client = client
         self._name = f"osteon-{uuid.uuid4().hex}"
         self._coordinator = plan.coordinator
+        self._stopped = False
         try:
             client.register_plugin(OsteonWorkers(plan, threads, self._name), name=self._name)
             if patience > 0 and client.scheduler_info(n_workers=-1)["workers"]:
                 await_attached(self.statuses, plan.coordinator, patience)
         except BaseException:
-            self.stop()
+            # What went wrong first is what matters.
+            with contextlib.suppress(Exception):
+                self.stop()
             raise
 
     def statuses(self) -> list[WorkerStatus]:
@@ -75,7 +79,10 @@ class DaskWorkers:
         return [status for status in found.values() if isinstance(status, WorkerStatus)]
 
     def stop(self) -> None:
-        """Drains all of them: they answer what they hold, and leave."""
+        """Drains all of them: they answer what they hold, and leave. A second call does nothing."""
+        if self._stopped:
+            return
+        self._stopped = True
         self._client.unregister_worker_plugin(self._name)
 
     def __enter__(self) -> DaskWorkers:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import ray
@@ -53,7 +54,9 @@ class RayWorkers:
             if patience > 0 and workers > 0:
                 await_attached(self._all, plan.coordinator, patience)
         except BaseException:
-            self.stop()
+            # What went wrong first is what matters.
+            with contextlib.suppress(Exception):
+                self.stop()
             raise
 
     def _all(self) -> list[WorkerStatus]:

@@ -79,7 +79,7 @@ class WorkerProcess:
         self._attached = False
         self._message = ""
         self._exit_code: int | None = None
-        self._failed: OSError | None = None
+        self._failed: Exception | None = None
         self._process: subprocess.Popen[str] | None = None
         self._started = threading.Event()
         found = _native.version()[0]
@@ -93,7 +93,7 @@ class WorkerProcess:
         self._thread.start()
         self._started.wait()
         if self._failed is not None:
-            raise ProgramError(f"{self._place}: cannot run a worker: {self._failed}")
+            raise ProgramError(f"{self._place}: cannot run a worker: {self._failed}") from self._failed
 
     def _follow(self, command: Sequence[str]) -> None:
         """Starts the worker and reads its log until it has ended."""
@@ -110,7 +110,8 @@ class WorkerProcess:
                 encoding="utf-8",
                 errors="replace",
             )
-        except OSError as error:
+        except Exception as error:
+            # Whatever it is, the thread that waits must hear of it.
             self._failed = error
             self._started.set()
             return
@@ -184,7 +185,9 @@ def await_attached(
             return
         if time.monotonic() > deadline:
             count = f"{len(waiting)} of {len(found)}" if found else "the"
-            said = f"; one said: {waiting[0].message}" if waiting and waiting[0].message else ""
+            # The last ones are those that have no place to run.
+            messages = [status.message for status in reversed(waiting) if status.message]
+            said = f"; one said: {messages[0]}" if messages else ""
             raise CoordinatorError(
                 f"{count} workers have not attached to the coordinator at {coordinator} within "
                 f"{patience:g} s{said}. Is it running, and can the cluster reach this address?"

@@ -2,7 +2,6 @@
 
 use anyhow::anyhow;
 use osteon_common::field_path::quoted;
-use osteon_common::parameters::Parameter;
 use osteon_files::materials::{self, Material};
 use serde_json::{Value, json};
 

@@ -24,7 +24,7 @@ use crate::request_id::RequestId;
 use crate::resolved::{Run, RunLocation};
 use crate::results_directory::ResultsDirectory;
 use crate::signals;
-use crate::{cost, result_status, unsearched_groups, warnings};
+use crate::{cost, report_directory, result_status, unsearched_groups, warnings};
 
 /// Runs the job, or shows the result of an earlier run.
 pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, CommandFailure> {
@@ -152,6 +152,9 @@ fn show(
 ) -> Result<ExitStatus, CommandFailure> {
     let shown = ShownResult { specification, result, directory: run.out.as_deref() };
     output::stdout(run.format).result(&shown).map_err(stdout_failure)?;
+    if let Some(directory) = run.out.as_deref().filter(|_| run.report) {
+        report_directory::write_beside(directory)?;
+    }
     Ok(result_status::exit_status(specification, result))
 }
 

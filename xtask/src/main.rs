@@ -11,6 +11,7 @@ mod peers;
 mod python;
 mod random;
 mod reference;
+mod report;
 mod slurm;
 mod tables;
 
@@ -139,6 +140,11 @@ const TASKS: &[(&str, &str, Action)] = &[
             &["deploy"],
             &["slurm", slurm::IF_INSTALLED],
         ]),
+    ),
+    (
+        "report",
+        "looks at reports in Chromium with the network off: rules of axe, script errors, widths",
+        Action::Function(report::check),
     ),
     (
         "slurm",

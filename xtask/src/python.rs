@@ -52,7 +52,7 @@ pub(crate) fn bench(words: &[String]) -> Result<()> {
     cargo(&mut command).context(NEEDS)
 }
 
-/// Builds wheels that run on every Linux with a glibc of 2017 or later, for each of the processors that
+/// Builds wheels that run on every Linux with glibc 2.17 or later, for both processors or those that
 /// `words` name.
 pub(crate) fn wheels(words: &[String]) -> Result<()> {
     let mut command = python("python/wheels.py");

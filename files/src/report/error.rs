@@ -25,10 +25,12 @@ pub enum ReadError {
         found: u64,
     },
     /// The file is the result of something that is not a job.
-    #[error("`kind` is {found}; it must be identification or propagation")]
+    #[error("`kind` is {found}; it must be {allowed}")]
     Kind {
         /// The kind, in quotes.
         found: String,
+        /// Those that can be read.
+        allowed: &'static str,
     },
     /// The value of a key is not what it must be.
     #[error("{path}: {cause}")]
@@ -41,8 +43,8 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    pub(super) fn unknown_kind(kind: &str) -> Self {
-        Self::Kind { found: quoted(kind) }
+    pub(super) fn unknown_kind(kind: &str, allowed: &'static str) -> Self {
+        Self::Kind { found: quoted(kind), allowed }
     }
 }
 

@@ -2,10 +2,11 @@
 
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::{Extremum, Picking};
+use osteon_common::version::RESULT_SCHEMA;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{DocumentContent, Solver};
+use super::{DocumentContent, Head, ReadError, Solver};
 
 /// One case and its velocity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -45,6 +46,21 @@ impl Simulation {
     /// The text of the file, with a final newline.
     pub fn to_json(&self) -> String {
         super::to_pretty_json(DocumentContent::Simulation(self))
+    }
+
+    /// Reads the text of a `result.json`. Unknown keys are ignored.
+    ///
+    /// # Errors
+    /// If the text is not JSON, is not the result of a simulation, or has another schema revision.
+    pub fn from_json(text: &str) -> Result<Self, ReadError> {
+        let Head { schema, kind } = super::parse(text)?;
+        if schema != u64::from(RESULT_SCHEMA) {
+            return Err(ReadError::Schema { found: schema });
+        }
+        match kind.as_str() {
+            "simulation" => super::parse(text),
+            _ => Err(ReadError::unknown_kind(&kind, "simulation")),
+        }
     }
 }
 

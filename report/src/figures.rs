@@ -1,0 +1,63 @@
+//! The figures of a report, each with two sentences on how to read it.
+
+mod comparison;
+mod convergence;
+mod failures;
+mod groups;
+mod moments;
+mod posterior;
+mod profiles;
+mod sequence;
+mod setup;
+mod solutions;
+mod traces;
+mod velocities;
+
+use crate::chart::Chart;
+use crate::finding::Finding;
+
+pub(crate) use comparison::overlay;
+pub(crate) use groups::forest;
+pub(crate) use setup::of_setup;
+pub(crate) use traces::of_traces;
+
+/// A chart, and how to read it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Figure {
+    /// The chart.
+    pub(crate) chart: Chart,
+    /// Two sentences on how to read it.
+    pub(crate) reading: String,
+}
+
+/// Figures under a heading.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FigureSection {
+    /// The heading.
+    pub(crate) heading: String,
+    /// The figures; a section without any is left out.
+    pub(crate) figures: Vec<Figure>,
+}
+
+/// Returns the sections on what was found from one set of data.
+pub(crate) fn of_finding(finding: &Finding<'_>) -> Vec<FigureSection> {
+    let suffix = finding.suffix();
+    let section = |heading: &str, figures| {
+        let heading = format!("{heading}{suffix}");
+        FigureSection { heading, figures }
+    };
+    let mut velocities = velocities::of(finding);
+    velocities.extend(sequence::of(finding));
+    vec![
+        section("Velocities", velocities),
+        section("Moments against their number", moments::of(finding)),
+        section("Convergence of the search", convergence::of(finding)),
+        section("What the data say of each parameter", {
+            let mut figures = profiles::of(finding);
+            figures.extend(posterior::of(finding));
+            figures
+        }),
+        section("Several starts", solutions::of(finding)),
+        section("Failed realizations", failures::of(finding)),
+    ]
+}

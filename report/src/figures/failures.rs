@@ -1,0 +1,85 @@
+//! Failed realizations: how many of each kind, and where they sit among the indices.
+
+use std::collections::BTreeMap;
+
+use super::Figure;
+use crate::chart::{Axis, Chart, Ink, Shape};
+use crate::finding::Finding;
+use crate::quantity;
+
+/// Number of places along the indices in which failures are counted.
+const PLACES: usize = 50;
+
+/// Returns the figures, if any realization failed.
+pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
+    if finding.failed() == 0 {
+        return Vec::new();
+    }
+    let mut figures = vec![by_kind(finding)];
+    figures.extend(along_indices(finding));
+    figures
+}
+
+fn by_kind(finding: &Finding<'_>) -> Figure {
+    let names = finding.failures.keys().map(|kind| quantity::failure(kind.name())).collect();
+    let y = Axis::of_categories("", names);
+    let largest = finding.failures.values().copied().max().unwrap_or(1) as f64;
+    let x = Axis::linear("failed realizations").from_to(0.0, 1.08 * largest);
+    let title = format!("Failures by kind{}", finding.suffix());
+    let mut chart = Chart::new(format!("{}failures", finding.prefix()), title, x, y);
+    let kinds = finding.failures.iter();
+    let kinds = kinds.map(|(kind, count)| format!("{count} {}", quantity::failure(kind.name())));
+    chart.description = kinds.collect::<Vec<_>>().join(", ");
+    let bars = finding
+        .failures
+        .values()
+        .enumerate()
+        .map(|(place, count)| [0.0, *count as f64, place as f64 - 0.3, place as f64 + 0.3]);
+    chart.height = (0.12 * finding.failures.len() as f64 + 0.1).max(0.3);
+    chart.layer("", Ink::Second, Shape::Rectangles(bars.collect()));
+    let share = 100.0 * finding.failed() as f64 / finding.realizations.max(1) as f64;
+    let reading = format!(
+        "{} of {} realizations ({}) have no velocity and count in no moment. Mostly slow bones fail, \
+         so that the mean is then too large and the variation too small; velocity.failure_bias in \
+         result.json estimates by how much.",
+        finding.failed(),
+        finding.realizations,
+        crate::number::digits(share, 2) + " %"
+    );
+    Figure { chart, reading }
+}
+
+fn along_indices(finding: &Finding<'_>) -> Option<Figure> {
+    let outcomes = &finding.model;
+    if outcomes.failures.is_empty() || outcomes.count == 0 {
+        return None;
+    }
+    let mut kinds: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for (index, kind) in &outcomes.failures {
+        kinds.entry(kind).or_default().push(*index);
+    }
+    let width = (outcomes.count as f64 / PLACES as f64).max(1.0);
+    let x = Axis::linear("index of the realization").from_to(0.0, outcomes.count as f64);
+    let y = Axis::linear(format!("failures among {} neighbours", width.ceil()));
+    let title = format!("Where failures sit{}", finding.suffix());
+    let name = format!("{}failures-by-index", finding.prefix());
+    let mut chart = Chart::new(name, title, x, y);
+    chart.description = format!("{} failures.", outcomes.failures.len());
+    for (place, (kind, indices)) in kinds.into_iter().enumerate() {
+        let mut counts = [0.0; PLACES];
+        for index in indices {
+            counts[((index / width) as usize).min(PLACES - 1)] += 1.0;
+        }
+        let used = (outcomes.count as f64 / width).ceil() as usize;
+        let bars = counts
+            .into_iter()
+            .take(used)
+            .enumerate()
+            .map(|(place, count)| [place as f64 * width, (place as f64 + 1.0) * width, count]);
+        let shown = quantity::failure(kind);
+        chart.layer(shown, Ink::of(place + 1), Shape::Bars(bars.collect()));
+    }
+    let reading = "Failures of independent realizations are spread evenly over the indices. Where they \
+                   pile up at some place, look at those realizations with osteon draw.";
+    Some(Figure { chart, reading: reading.to_owned() })
+}

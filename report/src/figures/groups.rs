@@ -1,0 +1,104 @@
+//! Groups of the data as forest plots.
+
+use super::Figure;
+use crate::chart::{Axis, Chart, Ink, Shape};
+use crate::finding::Finding;
+
+/// Most groups that are drawn.
+pub(crate) const GROUPS_MAX: usize = 60;
+
+/// Returns the figures that compare the groups: what was identified, and what was measured.
+pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
+    let shown = &findings[..findings.len().min(GROUPS_MAX)];
+    let identified = |finding: &Finding<'_>, dispersion: bool| -> Place {
+        if let Some(posterior) = finding.posterior {
+            let quantity = if dispersion {
+                posterior.parameters.get(&osteon_common::parameters::Parameter::Dispersion)
+            } else {
+                Some(&posterior.bulk_velocity)
+            };
+            return (quantity.and_then(|one| one.mean), quantity.and_then(|one| one.ends()));
+        }
+        let found = finding.identified;
+        let quantity =
+            found.map(|found| if dispersion { &found.dispersion } else { &found.bulk_velocity });
+        (quantity.and_then(|one| one.value), quantity.and_then(|one| one.ends()))
+    };
+    let measured = |finding: &Finding<'_>, variation: bool| -> Place {
+        let moment = osteon_files::report::Moment::ALL[usize::from(variation)];
+        let data = finding.data;
+        let ends = data.and_then(|data| data.intervals()).map(|both| both.get(moment));
+        (data.and_then(|data| data.moments.get(moment)), ends)
+    };
+    let left_out = findings.len() - shown.len();
+    let all: [(&str, &str, &str, Vec<Place>); 4] = [
+        (
+            "groups-bulk-velocity",
+            "√(c₁₁₁₁/ρ) of each group",
+            "√(c₁₁₁₁/ρ) (m/s)",
+            shown.iter().map(|one| identified(one, false)).collect(),
+        ),
+        (
+            "groups-dispersion",
+            "Dispersion of each group",
+            "dispersion δ",
+            shown.iter().map(|one| identified(one, true)).collect(),
+        ),
+        (
+            "groups-mean",
+            "Mean of each group's measured velocities",
+            "mean (m/s)",
+            shown.iter().map(|one| measured(one, false)).collect(),
+        ),
+        (
+            "groups-variation",
+            "Coefficient of variation of each group's measured velocities",
+            "coefficient of variation",
+            shown.iter().map(|one| measured(one, true)).collect(),
+        ),
+    ];
+    let figures = all.into_iter();
+    figures
+        .map(|(name, title, label, places)| figure(shown, left_out, [name, title, label], &places))
+        .collect()
+}
+
+/// A value and its interval.
+type Place = (Option<f64>, Option<[f64; 2]>);
+
+fn figure(
+    findings: &[Finding<'_>],
+    left_out: usize,
+    [name, title, label]: [&str; 3],
+    places: &[Place],
+) -> Figure {
+    let names = findings.iter().map(|one| one.group.unwrap_or_default().to_owned()).collect();
+    let y = Axis::of_categories("", names);
+    let mut chart = Chart::new(name, title, Axis::linear(label), y);
+    chart.height = (0.1 * places.len() as f64).max(0.35);
+    let rows = || places.iter().enumerate();
+    let intervals =
+        rows().filter_map(|(row, (_, ends))| ends.map(|[low, high]| [low, high, row as f64]));
+    chart.layer("95 % interval", Ink::First, Shape::Intervals(intervals.collect()));
+    let with = |interval: bool| {
+        let of = rows().filter(move |(_, (_, ends))| ends.is_some() == interval);
+        of.filter_map(|(row, (value, _))| Some([(*value)?, row as f64])).collect::<Vec<_>>()
+    };
+    chart.layer("value", Ink::First, Shape::Points(with(true)));
+    let without = with(false);
+    let mut reading = "Each row is a group: its value and its 95 % interval. Intervals that do not \
+                       overlap are different; two that overlap a little may be, too, which the table \
+                       of differences decides."
+        .to_owned();
+    if !without.is_empty() {
+        chart.layer("no interval known", Ink::Second, Shape::Points(without));
+        reading.push_str(
+            " Without an interval nothing is known of how far a value may be off: the data are too few, leave directions open, or are missed by the model.",
+        );
+    }
+    if left_out > 0 {
+        reading.push_str(&format!(" The last {left_out} groups are not drawn."));
+    }
+    chart.description = format!("{} groups.", places.len());
+    Figure { chart, reading }
+}

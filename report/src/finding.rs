@@ -1,0 +1,248 @@
+//! What was found from one set of data: a whole job without groups, or one group of it.
+
+use std::collections::BTreeMap;
+
+use osteon_common::inference::MomentWeights;
+use osteon_common::job::{JobSpecification, Objective, Range};
+use osteon_common::outcome::FailureKind;
+use osteon_common::parameters::Parameter;
+use osteon_common::results::Status;
+use osteon_files::report::{
+    Data, EstimatedErrors, Group, Identification, Identified, MeanModel, ParameterProfile,
+    PosteriorReport, Propagation, Solutions, Solver, Velocity,
+};
+
+use crate::input::{JobContext, Outcomes};
+use crate::sample::Sample;
+
+/// What was found from one set of data.
+#[derive(Debug)]
+pub(crate) struct Finding<'a> {
+    /// Name of the group, if there are groups.
+    pub(crate) group: Option<&'a str>,
+    /// Number of the set of data, from 0.
+    pub(crate) set: usize,
+    /// Where its keys are in `result.json`, as the beginning of a JSON pointer.
+    pub(crate) place: String,
+    /// How the search ended; `None` of a propagation.
+    pub(crate) status: Option<Status>,
+    /// Why it ended so.
+    pub(crate) reason: Option<&'a str>,
+    /// Cost of the best point.
+    pub(crate) cost: Option<f64>,
+    /// The mean model.
+    pub(crate) parameters: &'a MeanModel,
+    /// The dispersion.
+    pub(crate) dispersion: Option<f64>,
+    /// Moments of the model.
+    pub(crate) velocity: &'a Velocity,
+    /// The data.
+    pub(crate) data: Option<&'a Data>,
+    /// Failed realizations by kind.
+    pub(crate) failures: &'a BTreeMap<FailureKind, u64>,
+    /// What the data determine.
+    pub(crate) identified: Option<&'a Identified>,
+    /// The profiles; empty where there are none.
+    pub(crate) profiles: Option<&'a BTreeMap<Parameter, ParameterProfile>>,
+    /// The solutions from several starts.
+    pub(crate) solutions: Option<&'a Solutions>,
+    /// The posterior.
+    pub(crate) posterior: Option<&'a PosteriorReport>,
+    /// Number of realizations.
+    pub(crate) realizations: u64,
+    /// First evaluation below the sampling noise.
+    pub(crate) below_noise_from: Option<u64>,
+    /// How the velocities were computed.
+    pub(crate) solver: Option<&'a Solver<EstimatedErrors>>,
+    /// The measured velocities.
+    pub(crate) measured: Option<Sample>,
+    /// The velocities of the model, and its failures.
+    pub(crate) model: Outcomes,
+    /// The job and its tables.
+    pub(crate) context: &'a JobContext,
+}
+
+impl<'a> Finding<'a> {
+    /// Returns the findings of an identification: one, or one for each group.
+    pub(crate) fn of_identification(
+        result: &'a Identification,
+        context: &'a JobContext,
+    ) -> Vec<Self> {
+        let Some(groups) = &result.groups else {
+            return vec![Self::of_whole(result, context)];
+        };
+        let finding = |(set, group)| Self::of_group(set, group, result, context);
+        groups.iter().enumerate().map(finding).collect()
+    }
+
+    fn of_whole(result: &'a Identification, context: &'a JobContext) -> Self {
+        Self {
+            group: None,
+            set: 0,
+            place: String::new(),
+            status: Some(result.status),
+            reason: result.reason.as_deref(),
+            cost: result.cost,
+            parameters: &result.parameters,
+            dispersion: result.dispersion,
+            velocity: &result.velocity,
+            data: result.data.as_ref(),
+            failures: &result.failures,
+            identified: result.identified(),
+            profiles: Some(&result.profiles),
+            solutions: result.solutions.as_ref(),
+            posterior: result.posterior(),
+            realizations: result.realizations,
+            below_noise_from: result.search.below_noise_from,
+            solver: Some(&result.solver),
+            measured: measured(context, 0),
+            model: model(context, None),
+            context,
+        }
+    }
+
+    fn of_group(
+        set: usize,
+        group: &'a Group,
+        result: &'a Identification,
+        context: &'a JobContext,
+    ) -> Self {
+        Self {
+            group: Some(&group.name),
+            set,
+            place: format!("/groups/{set}"),
+            status: Some(group.status),
+            reason: group.reason.as_deref(),
+            cost: group.cost,
+            parameters: &group.parameters,
+            dispersion: group.dispersion,
+            velocity: &group.velocity,
+            data: Some(&group.data),
+            failures: &group.failures,
+            identified: group.identified.as_ref(),
+            profiles: Some(&group.profiles),
+            solutions: group.solutions.as_ref(),
+            posterior: group.posterior.as_ref(),
+            realizations: result.realizations,
+            below_noise_from: None,
+            solver: None,
+            measured: measured(context, set),
+            model: model(context, Some(&group.name)),
+            context,
+        }
+    }
+
+    /// Returns the finding of a propagation.
+    pub(crate) fn of_propagation(result: &'a Propagation, context: &'a JobContext) -> Self {
+        Self {
+            group: None,
+            set: 0,
+            place: String::new(),
+            status: None,
+            reason: None,
+            cost: None,
+            parameters: &result.parameters,
+            dispersion: result.dispersion,
+            velocity: &result.velocity,
+            data: None,
+            failures: &result.failures,
+            identified: None,
+            profiles: None,
+            solutions: None,
+            posterior: None,
+            realizations: result.realizations,
+            below_noise_from: None,
+            solver: Some(&result.solver),
+            measured: None,
+            model: model(context, None),
+            context,
+        }
+    }
+
+    /// The job.
+    pub(crate) fn specification(&self) -> &JobSpecification {
+        &self.context.specification
+    }
+
+    /// Returns a parameter's range in the search of this set.
+    pub(crate) fn range(&self, parameter: Parameter) -> Range {
+        let ranges = self.specification().ranges_of(self.set);
+        ranges.get(parameter as usize).copied().unwrap_or(Range::AS_IN_SETUP)
+    }
+
+    /// Returns the free parameters.
+    pub(crate) fn free(&self) -> Vec<Parameter> {
+        let free = |parameter: &Parameter| matches!(self.range(*parameter), Range::Free { .. });
+        Parameter::ALL.into_iter().filter(free).collect()
+    }
+
+    /// Returns the value of a parameter at the best point, and where it is in the result.
+    pub(crate) fn value(&self, parameter: Parameter) -> (Option<f64>, String) {
+        let model = self.parameters;
+        let value = match parameter {
+            Parameter::Dispersion => {
+                return (self.dispersion, format!("{}/dispersion", self.place));
+            }
+            Parameter::Density => model.density,
+            Parameter::LongitudinalYoungModulus => model.longitudinal_young_modulus,
+            Parameter::LongitudinalPoissonRatio => model.longitudinal_poisson_ratio,
+            Parameter::LongitudinalShearModulus => model.longitudinal_shear_modulus,
+            Parameter::TransverseYoungModulus => model.transverse_young_modulus,
+            Parameter::TransversePoissonRatio => model.transverse_poisson_ratio,
+            Parameter::BoneThickness => model.bone_thickness,
+            Parameter::BoneQualityFactor => model.bone_quality_factor,
+            Parameter::CouplingSoundSpeed => model.coupling_sound_speed,
+        };
+        (value, format!("{}/parameters/{}", self.place, parameter.name()))
+    }
+
+    /// Number of failed realizations at the best point.
+    pub(crate) fn failed(&self) -> u64 {
+        self.failures.values().sum()
+    }
+
+    /// Returns the cost that sampling noise alone makes, as `search.below_noise_from` has it; `None` for
+    /// a cost that does not depend on the moments alone.
+    pub(crate) fn noise_level(&self) -> Option<f64> {
+        let specification = self.specification();
+        if !specification.objective.is_of_moments()
+            || specification.has_priors()
+            || specification.has_decays()
+        {
+            return None;
+        }
+        let (moments, errors) = (&self.velocity.moments, &self.velocity.standard_error);
+        let relative = [
+            errors.mean? / moments.mean?,
+            errors.coefficient_of_variation? / moments.coefficient_of_variation?,
+        ];
+        let data = specification.data.as_ref();
+        let weights = data
+            .filter(|_| specification.objective == Objective::ChiSquare)
+            .and_then(|data| MomentWeights::of_data(data, self.set));
+        let level = match weights {
+            Some(weights) => weights.of_errors(relative),
+            None => relative.iter().map(|error| error * error).sum(),
+        };
+        (level > 0.0).then_some(level)
+    }
+
+    /// Returns the beginning of the names of its figures.
+    pub(crate) fn prefix(&self) -> String {
+        self.group.map_or_else(String::new, |_| format!("group-{}-", self.set + 1))
+    }
+
+    /// Returns the end of the titles of its figures.
+    pub(crate) fn suffix(&self) -> String {
+        self.group.map_or_else(String::new, |name| format!(", group {name}"))
+    }
+}
+
+fn measured(context: &JobContext, set: usize) -> Option<Sample> {
+    let data = context.specification.data.as_ref()?;
+    Sample::new(data.velocities(set)?.to_vec())
+}
+
+fn model(context: &JobContext, group: Option<&str>) -> Outcomes {
+    context.realizations.as_ref().map(|all| all.of(group)).unwrap_or_default()
+}

@@ -1,0 +1,20 @@
+//! Reports of results: one page of HTML that needs nothing else, and its figures as SVG with their
+//! numbers as CSV.
+//!
+//! [`report`] is a function from parsed results to texts; nothing here reads or writes a file. The same
+//! results give the same bytes: there is no time, machine or path in a report, and no order by chance.
+
+mod chart;
+mod figures;
+mod finding;
+mod input;
+mod number;
+mod page;
+mod quantity;
+mod sample;
+mod table;
+mod text;
+
+pub use input::{JobTables, ReportedRun};
+pub use page::{Report, ReportText, files_of, report};
+pub use table::TableError;

@@ -1,0 +1,91 @@
+"""Opens reports in headless Chromium with the network off: rules of axe, script errors, widths.
+
+    report.py --osteon PROGRAM --work DIRECTORY --chromium PROGRAM
+
+makes reports of a simulation, of groups and of a comparison, and looks at each at three widths, light and dark.
+"""
+
+import argparse
+import importlib.resources
+import pathlib
+import subprocess
+import sys
+import venv
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+WIDTHS = (1280, 800, 390)
+
+
+def make_reports(osteon, work):
+    """Returns the pages of the reports, which are made once per directory."""
+    case, groups = work / "case", work / "groups"
+    subprocess.run([osteon, "simulate", ROOT / "examples/cases/A.toml", "--out", case, "--report"],
+                   check=True, timeout=120, stdout=subprocess.DEVNULL)
+    subprocess.run([osteon, "identify", ROOT / "examples/groups.toml", "--out", groups, "--report"],
+                   check=True, timeout=600, stdout=subprocess.DEVNULL)
+    both = work / "both"
+    subprocess.run([osteon, "report", groups, groups, "--out", both], check=True, timeout=120)
+    return [folder / "index.html" for folder in (case / "report", groups / "report", both)]
+
+
+def problems_of(browser, page_file, width, scheme, axe):
+    context = browser.new_context(
+        viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True)
+    page, found = context.new_page(), []
+    page.on("console", lambda message: found.append(f"console: {message.text}"))
+    page.on("pageerror", lambda error: found.append(f"script: {error}"))
+    page.on("request", lambda request: request.url.startswith("file:")
+            or found.append(f"request: {request.url}"))
+    page.goto(page_file.as_uri())
+    page.mouse.move(width / 2, 400)
+    if page.evaluate("document.documentElement.scrollWidth > window.innerWidth"):
+        found.append("the page is wider than its window")
+    page.evaluate(axe)
+    rules = page.evaluate(
+        "async () => (await axe.run()).violations.map((rule) => [rule.id, rule.nodes[0].html])")
+    found += [f"axe {rule}: {html[:200]}" for rule, html in rules]
+    page.screenshot(path=page_file.with_name(f"{page_file.parent.name}-{width}-{scheme}.png"),
+                    full_page=True)
+    context.close()
+    return found
+
+
+def check(arguments):
+    from playwright.sync_api import sync_playwright
+
+    axe = importlib.resources.files("axe_playwright_python").joinpath("axe.min.js").read_text()
+    failed = False
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=arguments.chromium, args=["--no-sandbox"])
+        for page_file in make_reports(arguments.osteon, arguments.work):
+            for width in WIDTHS:
+                for scheme in ("light", "dark"):
+                    found = problems_of(browser, page_file, width, scheme, axe)
+                    print(page_file, width, scheme, "; ".join(found) or "ok")
+                    failed = failed or bool(found)
+        browser.close()
+    return 1 if failed else 0
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--osteon", type=pathlib.Path, required=True)
+    parser.add_argument("--work", type=pathlib.Path, required=True)
+    parser.add_argument("--chromium", required=True)
+    arguments = parser.parse_args()
+    arguments.work.mkdir(parents=True, exist_ok=True)
+    environment = arguments.work / "venv"
+    if pathlib.Path(sys.prefix) == environment.resolve():
+        return check(arguments)
+    if not environment.exists():
+        venv.create(environment, with_pip=True)
+    python = environment / "bin/python"
+    subprocess.run([python, "-m", "pip", "install", "--quiet", "-r", HERE / "requirements.txt"],
+                   check=True, timeout=600)
+    return subprocess.run([python, *sys.argv]).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,30 @@
+//! Looks at reports in a browser: `tests/browser/report.py`.
+
+use std::process::Command;
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::{cargo, cargo_command, programs, root};
+
+/// Names of the browser, as Debian and others install it.
+const BROWSERS: [&str; 2] = ["chromium", "chromium-browser"];
+
+/// `cargo xtask report`: makes reports, and checks them in headless Chromium with the network off.
+pub(crate) fn check(words: &[String]) -> Result<()> {
+    if !words.is_empty() {
+        bail!("usage: cargo xtask report");
+    }
+    let runs = |name: &&str| {
+        Command::new(name).arg("--version").output().is_ok_and(|run| run.status.success())
+    };
+    let browser = BROWSERS.into_iter().find(runs);
+    let browser = browser.context("there is no Chromium (on Debian the package chromium)")?;
+    cargo(&mut cargo_command(&["build", "--bin", "osteon"]))?;
+    let mut command = Command::new("python3");
+    command.current_dir(root()).arg("tests/browser/report.py");
+    command.arg("--osteon").arg(programs()?.join("osteon"));
+    command.arg("--work").arg(programs()?.with_file_name("report"));
+    cargo(command.args(["--chromium", browser])).context(
+        "the check needs Python 3.10 or later with its module venv, and its requirements.txt",
+    )
+}
