@@ -16,10 +16,9 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
-    CredentialArguments, DrawArguments, InitArguments, JobsArguments, JobsCommand, LogFormat,
-    MaterialsArguments, ObserveArguments, ProgressFormat, ReportArguments, RunArguments,
-    SchemaArguments, SimulateArguments, SubmitArguments, TokenArguments, WatchArguments,
-    WorkerArguments, WorkersArguments, WorkersCommand,
+    CredentialArguments, DrawArguments, InitArguments, LogFormat, MaterialsArguments,
+    ObserveArguments, ProgressFormat, ReportArguments, RunArguments, SchemaArguments,
+    SimulateArguments, TokenArguments, WorkerArguments,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};

@@ -7,12 +7,7 @@ use osteon_common::warnings::Warning;
 use osteon_files::document::Format;
 use osteon_files::job_file;
 
-/// What the job of `files/job.toml` gets from a file with these bytes.
-fn read(bytes: &[u8]) -> Result<Option<Data>, String> {
-    read_as(bytes, "")
-}
-
-/// The same with more keys in `[data]`.
+/// What the job of `files/job.toml` gets from a file with these bytes, with more keys in `[data]`.
 fn read_as(bytes: &[u8], more: &str) -> Result<Option<Data>, String> {
     let directory = tempfile::tempdir().unwrap();
     std::fs::create_dir(directory.path().join("data")).unwrap();
