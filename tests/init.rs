@@ -14,7 +14,8 @@ use support::{Scratch, run, text};
 fn spreadsheet() -> Vec<u8> {
     let row = |k: u32| {
         let velocity = 3880 + k * 37 % 180;
-        format!("M\u{fc}ller {};{};3,{}\r\n", k / 4, ["a", "b"][k as usize % 2], velocity - 3000)
+        let group = ["a", "b"][k as usize % 2];
+        format!("M\u{fc}ller {};{group};{},{:03}\r\n", k / 4, velocity / 1000, velocity % 1000)
     };
     let text = format!(
         "Patient;Gruppe;FAS (km/s)\r\nM\u{fc}ller 9;a;\r\n{}",

@@ -1,6 +1,6 @@
 //! `osteon umbridge`: the models of a job over HTTP, as clients of UM-Bridge see them.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on should say where")]
 
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]

@@ -114,7 +114,7 @@ impl Axis {
     }
 
     /// The same axis with these ends.
-    pub(crate) fn from_to(self, low: f64, high: f64) -> Self {
+    pub(crate) fn spanning(self, low: f64, high: f64) -> Self {
         Self { range: Some([low, high]), ..self }
     }
 }

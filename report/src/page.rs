@@ -209,9 +209,9 @@ fn page(title: &str, sections: &[PageSection]) -> String {
     for (place, PageSection { heading, body: text }) in sections.iter().enumerate() {
         let heading = escaped(heading);
         let _infallible = write!(contents, "<li><a href=\"#s{place}\">{heading}</a></li>");
-        let _infallible = write!(
+        let _infallible = writeln!(
             body,
-            "<section aria-labelledby=\"s{place}\"><h2 id=\"s{place}\">{heading}</h2>{text}</section>\n"
+            "<section aria-labelledby=\"s{place}\"><h2 id=\"s{place}\">{heading}</h2>{text}</section>"
         );
     }
     let title = escaped(title);

@@ -1,5 +1,3 @@
-#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
-
 use std::fs;
 use std::path::Path;
 

@@ -82,7 +82,7 @@ fn cost(finding: &Finding<'_>, rows: &SearchRows<'_>) -> Figure {
     let level = finding.noise_level();
     let y = if positive && smallest < largest {
         let low = level.map_or(smallest, |level| level.min(smallest)).max(largest * 1e-16);
-        Axis::logarithmic("cost").from_to(low / 2.0, largest * 2.0)
+        Axis::logarithmic("cost").spanning(low / 2.0, largest * 2.0)
     } else {
         Axis::linear("cost")
     };
@@ -148,7 +148,7 @@ fn parameters(finding: &Finding<'_>, rows: &SearchRows<'_>) -> Option<Figure> {
     if free.is_empty() {
         return None;
     }
-    let y = Axis::linear("place between the bounds (0: lower, 1: upper)").from_to(0.0, 1.0);
+    let y = Axis::linear("place between the bounds (0: lower, 1: upper)").spanning(0.0, 1.0);
     let title = format!("Parameters within their bounds{}", finding.suffix());
     let name = format!("{}search-parameters", finding.prefix());
     let mut chart = Chart::new(name, title, Axis::linear(X), y);

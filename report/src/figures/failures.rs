@@ -24,7 +24,7 @@ fn by_kind(finding: &Finding<'_>) -> Figure {
     let names = finding.failures.keys().map(|kind| quantity::failure(kind.name())).collect();
     let y = Axis::of_categories("", names);
     let largest = finding.failures.values().copied().max().unwrap_or(1) as f64;
-    let x = Axis::linear("failed realizations").from_to(0.0, 1.08 * largest);
+    let x = Axis::linear("failed realizations").spanning(0.0, 1.08 * largest);
     let title = format!("Failures by kind{}", finding.suffix());
     let mut chart = Chart::new(format!("{}failures", finding.prefix()), title, x, y);
     let kinds = finding.failures.iter();
@@ -59,7 +59,7 @@ fn along_indices(finding: &Finding<'_>) -> Option<Figure> {
         kinds.entry(kind).or_default().push(*index);
     }
     let width = (outcomes.count as f64 / PLACES as f64).max(1.0);
-    let x = Axis::linear("index of the realization").from_to(0.0, outcomes.count as f64);
+    let x = Axis::linear("index of the realization").spanning(0.0, outcomes.count as f64);
     let y = Axis::linear(format!("failures among {} neighbours", width.ceil()));
     let title = format!("Where failures sit{}", finding.suffix());
     let name = format!("{}failures-by-index", finding.prefix());

@@ -34,8 +34,8 @@ pub(crate) fn of_setup(setup: &Setup) -> Figure {
     let most = (right - left) * 0.4;
     let [shown_above, shown_below] = [above.min(most), below.min(most)];
     let top = all_heights(&places, &sources).fold(shown_above, f64::max);
-    let x = Axis::linear(LENGTH.after("x₁ along the bone")).from_to(left, right);
-    let y = Axis::linear(LENGTH.after("x₃")).from_to(-bone - shown_below, top);
+    let x = Axis::linear(LENGTH.after("x₁ along the bone")).spanning(left, right);
+    let y = Axis::linear(LENGTH.after("x₃")).spanning(-bone - shown_below, top);
     let mut chart = Chart::new("setup", "The set-up, to scale", x, y);
     chart.to_scale = true;
     let show = |length: f64| LENGTH.show(length * LENGTH.size, Precision::Digits(3));

@@ -16,7 +16,7 @@ pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
     }
     let names = free.iter().map(|parameter| symbol(*parameter).to_owned()).collect();
     let x = Axis::of_categories("free parameter", names);
-    let y = Axis::linear("place between the bounds (0: lower, 1: upper)").from_to(0.0, 1.0);
+    let y = Axis::linear("place between the bounds (0: lower, 1: upper)").spanning(0.0, 1.0);
     let title = format!("Solutions from {} starts{}", solutions.points.len(), finding.suffix());
     let mut chart = Chart::new(format!("{}solutions", finding.prefix()), title, x, y);
     let described = free.iter().map(|one| format!("{} ({})", symbol(*one), words(*one)));

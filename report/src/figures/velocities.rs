@@ -53,7 +53,7 @@ impl ComparedSamples<'_> {
     }
 
     fn distribution(&self, name: String, title: String) -> Figure {
-        let y = Axis::linear("share of velocities up to this one").from_to(0.0, 1.0);
+        let y = Axis::linear("share of velocities up to this one").spanning(0.0, 1.0);
         let mut chart = Chart::new(name, title, Axis::linear(AXIS), y);
         chart.description = self.described();
         if let Some(measured) = self.measured {
@@ -116,7 +116,7 @@ impl ComparedSamples<'_> {
             self.named().map(|(name, ink, sample)| (name, ink, sample.density())).collect();
         let all = densities.iter().flat_map(|(_, _, line)| line.iter().map(|[_, height]| *height));
         let highest = all.fold(0.0, f64::max);
-        let y = Axis::logarithmic("density (1/(m/s)), logarithmic").from_to(lowest, 2.0 * highest);
+        let y = Axis::logarithmic("density (1/(m/s)), logarithmic").spanning(lowest, 2.0 * highest);
         let mut chart = Chart::new(name, title, Axis::linear(AXIS), y);
         chart.description = self.described();
         for (name, ink, line) in densities {
@@ -156,7 +156,7 @@ impl ComparedSamples<'_> {
         let half = NORMAL_95 * libm::sqrt(variance);
         let x = Axis::linear("model's distribution function at a measured velocity");
         let y = Axis::linear("velocities relative to the expected number");
-        let mut chart = Chart::new(name, title, x.from_to(0.0, 1.0), y);
+        let mut chart = Chart::new(name, title, x.spanning(0.0, 1.0), y);
         chart.description = format!("{} {places} places of equal probability.", self.described());
         let band = [0.0, 1.0].map(|x| [x, (1.0 - half).max(0.0), 1.0 + half]);
         chart.layer("expected, 95 % of the bars", Ink::Muted, Shape::Band(band.to_vec()));
