@@ -130,7 +130,7 @@ pub(crate) fn write(out: &Path, runs: &[ReportedRun]) -> Result<String, CommandF
 /// Writes the report of the results in `directory` to its folder `report`, and says where it is.
 ///
 /// # Errors
-/// Same as [`read`] and [`write`].
+/// Same as [`read()`] and [`write()`].
 pub(crate) fn write_beside(directory: &Path) -> Result<(), CommandFailure> {
     let page = write(&directory.join(REPORT), &[read(directory)?])?;
     say(&format!("report: {page}"));
