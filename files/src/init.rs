@@ -30,7 +30,7 @@ pub enum InitError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What happened.
+        /// The error of the operating system.
         cause: std::io::Error,
     },
     /// It is not understood.
@@ -48,7 +48,7 @@ pub enum InitError {
 pub struct FirstJob {
     /// The text of the job file.
     pub text: String,
-    /// What was understood, a sentence each.
+    /// Findings about the CSV file, a sentence each.
     pub understood: Vec<String>,
 }
 

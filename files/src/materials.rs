@@ -20,13 +20,13 @@ pub(crate) const KEY: &str = "material";
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
-    /// What it is, in a few words.
+    /// Description in a few words.
     pub description: String,
     /// Authors, title, journal, year and pages.
     pub reference: String,
     /// Digital object identifier of the reference, where it is known.
     pub doi: Option<String>,
-    /// What of numbers and reference was compared with the source.
+    /// Which of its numbers, and whether its reference, were compared with the source.
     pub checked: String,
     /// Mass density, kg/m³.
     pub density: f64,
@@ -119,7 +119,7 @@ pub fn named(name: &str) -> Option<&'static Material> {
     all().iter().find(|(known, _)| *known == name).map(|(_, material)| material)
 }
 
-/// What a table says of a material, whose values stand in for keys that the table leaves out.
+/// The material that a table names; its values stand in for keys that the table leaves out.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Base {
     /// It names none.

@@ -28,7 +28,7 @@ const LIKE_GROUPS: [&str; 10] = [
     "gruppe",
 ];
 
-/// What the columns of a file are.
+/// The columns that a job uses, and their values in short.
 #[derive(Debug)]
 pub(super) struct Roles {
     pub(super) velocity: String,
