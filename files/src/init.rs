@@ -9,7 +9,7 @@ mod layout;
 mod roles;
 mod template;
 
-use std::fs;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use osteon_common::{limits, visible};
@@ -59,11 +59,12 @@ pub struct FirstJob {
 pub fn of_csv(path: &Path, name: &str) -> Result<FirstJob, InitError> {
     let unreadable = |cause| InitError::Unreadable { path: path.to_owned(), cause };
     let refused = |reason| InitError::NotUnderstood { path: path.to_owned(), reason };
-    let file = user_file::open(path).map_err(unreadable)?;
-    if file.metadata().map_err(unreadable)?.len() > limits::FILE_BYTES_MAX {
+    let mut file = user_file::open(path).map_err(unreadable)?.take(limits::FILE_BYTES_MAX + 1);
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > limits::FILE_BYTES_MAX {
         return Err(refused(format!("it is longer than {} bytes", limits::FILE_BYTES_MAX)));
     }
-    let bytes = fs::read(path).map_err(unreadable)?;
     let layout = Layout::of(&bytes).map_err(refused)?;
     let roles = Roles::of(&layout).map_err(refused)?;
     let mut understood = layout.described();

@@ -9,7 +9,7 @@ use osteon_common::job::{Data, Group, NoVariation};
 
 use csv_job::{read_as, warnings};
 
-/// What the job of `files/job.toml` gets from a file with these bytes.
+/// Same as [`read_as`], without more keys.
 fn read(bytes: &[u8]) -> Result<Option<Data>, String> {
     read_as(bytes, "")
 }

@@ -28,7 +28,7 @@ number follows its type.
 const FILE_MESSAGE: i32 = 4;
 const FILE_ENUM: i32 = 5;
 const FILE_SERVICE: i32 = 6;
-/// Of messages the fields, of enumerations the values, of services the methods.
+/// The fields of a message, the values of an enumeration, or the methods of a service.
 const PART: i32 = 2;
 const MESSAGE_NESTED: i32 = 3;
 const MESSAGE_ENUM: i32 = 4;

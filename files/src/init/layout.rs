@@ -1,11 +1,13 @@
 //! Encoding, separator and decimal mark of a CSV file, and its cells.
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+use osteon_common::limits;
 
 use crate::velocities::{DecimalMark, Separator, csv_fields};
 
-/// Maximum number of rows that are looked at.
-const ROWS_MAX: usize = 100_000;
+/// Maximum number of lines that are looked at: those of the largest file that a job can use, with its
+/// header and a line above it.
+const LINES_MAX: usize = limits::DATA_VELOCITIES_MAX + 2;
 /// Number of lines by which the separator is chosen.
 const SEPARATOR_LINES: usize = 200;
 
@@ -30,7 +32,7 @@ impl Layout {
         let (used, named) = encoding(bytes);
         let (text, _, _) = used.decode(bytes);
         let is_text = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
-        let mut lines: Vec<&str> = text.lines().filter(is_text).take(ROWS_MAX).collect();
+        let mut lines: Vec<&str> = text.lines().filter(is_text).take(LINES_MAX).collect();
         let above = lines.first().and_then(|line| Separator::of_first_line(line));
         if above.is_some() {
             lines.remove(0);

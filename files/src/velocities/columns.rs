@@ -11,7 +11,7 @@ use super::problem::{COLUMN, CsvHint, Problem, listed, shortened};
 const LIKE_SUBJECTS: [&str; 7] =
     ["subject", "subject_id", "patient", "patient_id", "specimen", "specimen_id", "id"];
 
-/// What the name of a column of velocities may contain, in lower case.
+/// Words, in lower case, one of which the name of a column of velocities usually contains.
 const LIKE_VELOCITY: [&str; 6] =
     ["velocity", "speed", "fas", "geschwindigkeit", "vitesse", "velocidad"];
 
@@ -55,7 +55,7 @@ struct NamedColumn {
     named: &'static str,
 }
 
-/// What a line is.
+/// A line below the header, as it is read.
 pub(super) enum CsvLine {
     Row(Row),
     /// A row in which a value is missing.

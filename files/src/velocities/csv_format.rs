@@ -7,7 +7,7 @@ use osteon_common::fields::Choice;
 /// decimal points, the column `velocity` in m/s.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CsvFormat {
-    /// What separates fields; `None` for a comma, or what a first line `sep=…` names.
+    /// The separator of fields; `None` for that of a first line `sep=…`, or else a comma.
     pub(crate) separator: Option<Separator>,
     pub(crate) decimal: DecimalMark,
     /// Name of the column of velocities, if it is not `velocity`.
@@ -19,7 +19,7 @@ pub(crate) struct CsvFormat {
     pub(crate) encoding: Option<&'static Encoding>,
 }
 
-/// What separates the fields of a line.
+/// The character between the fields of a line.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) enum Separator {
     #[default]

@@ -5,7 +5,8 @@ use osteon_common::warnings::Warning;
 use osteon_files::document::Format;
 use osteon_files::job_file;
 
-/// What the job of `files/job.toml` gets from a file with these bytes, with more keys in `[data]`.
+/// Reads the job of `files/job.toml` with a CSV file of these bytes and with more keys in `[data]`;
+/// returns its data, or the refusal.
 pub(crate) fn read_as(bytes: &[u8], more: &str) -> Result<Option<Data>, String> {
     let directory = tempfile::tempdir().unwrap();
     std::fs::create_dir(directory.path().join("data")).unwrap();
