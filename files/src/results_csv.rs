@@ -41,7 +41,7 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
 }
 
 /// Returns a text as a field that no spreadsheet interprets as a formula. A `'` is put before a
-/// [`FORMULA`] character at the beginning or, since some programs take `;` for the end of a field,
+/// character of `FORMULA` at the beginning or, since some programs take `;` for the end of a field,
 /// after a `;`. It is also put before a `'` in such a place, so that the text is recovered by
 /// removing one `'` there. The field is quoted if necessary.
 pub fn field(text: &str) -> String {
