@@ -14,7 +14,6 @@ use std::time::{Duration, Instant};
 
 use osteon_common::job::JobSpecification;
 use osteon_coordinator::config::{AUDIT_FRACTION, Config};
-use osteon_coordinator::core::completion::Completed;
 use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::{Event, Hello};
 use osteon_coordinator::core::ids::{ReplyId, WorkerId};
@@ -70,7 +69,7 @@ enum Next {
     Answer(u64),
     /// The record that has waited longest is durable.
     Stored,
-    /// An evaluation has been completed beside the core.
+    /// A step of the completion of an evaluation beside the core is done.
     Completed,
 }
 
@@ -85,7 +84,7 @@ struct Fleet {
     numbers: u64,
     /// Batches of each worker in the order they were sent, each with the time at which it ends.
     held: BTreeMap<u64, VecDeque<(Effect, Duration)>>,
-    completed: VecDeque<Completed>,
+    completed: VecDeque<Event>,
     /// Events that report records on their way to the store.
     storing: VecDeque<Event>,
     /// Number of evaluations that were stored, with their realizations.
@@ -235,7 +234,7 @@ impl Fleet {
                 Next::Answer(worker) => self.answer(worker),
                 Next::Completed => {
                     let completed = self.completed.pop_front().unwrap();
-                    self.react(Event::Completed(completed));
+                    self.react(completed);
                 }
                 Next::Stored => {
                     let stored = self.storing.pop_front().unwrap();
@@ -288,7 +287,14 @@ impl Fleet {
                 Effect::Complete(completion) => {
                     // It runs on another thread.
                     let begun = Instant::now();
-                    self.completed.push_back(completion.run());
+                    let mut gathered = None;
+                    let completed = completion.run(|outcomes| {
+                        gathered = Some((begun.elapsed(), outcomes));
+                    });
+                    let (took, outcomes) = gathered.unwrap();
+                    self.completed.push_back(Event::Gathered(outcomes));
+                    self.schedule(took, Next::Completed);
+                    self.completed.push_back(Event::Completed(completed.unwrap()));
                     self.schedule(begun.elapsed(), Next::Completed);
                 }
                 Effect::Store(record) => {

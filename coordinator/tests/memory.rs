@@ -29,15 +29,23 @@ fn run(state: &mut State, store: &mut SqliteStore, request: Request) {
     let requested = Event::Requested { reply_id: ReplyId(1), request };
     let mut effects = VecDeque::from(react(state, requested, Duration::ZERO));
     while let Some(effect) = effects.pop_front() {
-        let event = match effect {
+        let events = match effect {
             Effect::Send { worker, batch, work } => {
-                Event::Answered { worker, batch, solved: fake::solved(&work), elapsed_s: 0.01 }
+                let solved = fake::solved(&work);
+                vec![Event::Answered { worker, batch, solved, elapsed_s: 0.01 }]
             }
-            Effect::Complete(completion) => Event::Completed(completion.run()),
-            Effect::Store(record) => fake::written(store, &record),
+            Effect::Complete(completion) => {
+                let mut events = Vec::new();
+                let completed = completion.run(|outcomes| events.push(Event::Gathered(outcomes)));
+                events.extend(completed.map(Event::Completed));
+                events
+            }
+            Effect::Store(record) => vec![fake::written(store, &record)],
             _ => continue,
         };
-        effects.extend(react(state, event, Duration::ZERO));
+        for event in events {
+            effects.extend(react(state, event, Duration::ZERO));
+        }
     }
 }
 

@@ -2,7 +2,8 @@
 //!
 //! Outcomes are gathered, moments computed and the digest continued, over millions of realizations.
 //! Meanwhile the core would answer nobody. So it hands the evaluation and its search out
-//! ([`Effect::Complete`](crate::core::effect::Effect::Complete)), and gets a record to store back.
+//! ([`Effect::Complete`](crate::core::effect::Effect::Complete)), and gets back first a record, which is
+//! stored meanwhile, and then the search.
 
 use std::panic::resume_unwind;
 use std::thread;
@@ -21,22 +22,31 @@ pub struct Completion {
     pub(crate) search: Box<Search>,
 }
 
+/// The outcomes of a settled evaluation, to be stored while the search takes them in.
+#[derive(Debug, Clone)]
+pub struct Gathered {
+    pub(crate) job: JobId,
+    /// Number of the attempt at it.
+    pub(crate) attempt: u64,
+    pub(crate) record: EvaluationRecord,
+    /// The evaluations stored after it belong to another path.
+    pub(crate) is_last: bool,
+}
+
 /// A completed evaluation.
 #[derive(Debug, Clone)]
 pub struct Completed {
     pub(crate) job: JobId,
     /// Number of the attempt at it.
     pub(crate) attempt: u64,
-    /// The record, and whether the evaluations stored after it belong to another path; `None` if it was
-    /// not settled.
-    pub(crate) record: Option<(EvaluationRecord, bool)>,
     /// The search after it.
     pub(crate) after: Box<Search>,
 }
 
 impl Completion {
-    /// Completes the evaluation. Takes a while, and depends on nothing else.
-    pub fn run(self) -> Completed {
+    /// Completes the evaluation, and calls `gathered` before the search has taken it in; `None` if it
+    /// was not settled. Takes a while, and depends on nothing else.
+    pub fn run(self, gathered: impl FnOnce(Gathered)) -> Option<Completed> {
         let Self { job, evaluation, search: mut after } = self;
         let attempt = evaluation.attempt;
         let with_decays = after.has_decays();
@@ -47,16 +57,17 @@ impl Completion {
                 errors.join().unwrap_or_else(|panic| resume_unwind(panic)),
             )
         });
-        let record = outcomes.map(|outcomes| {
-            let is_last = evaluation.diverges_from_store(&outcomes);
-            let (number, point) = (evaluation.number, evaluation.point);
-            let workers = evaluation.workers.iter().cloned().collect();
-            after.tell(outcomes.clone(), estimated_error);
-            let record =
-                EvaluationRecord { job, number, point, outcomes, estimated_error, workers };
-            (record, is_last)
-        });
-        Completed { job, attempt, record, after }
+        let outcomes = outcomes?;
+        let is_last = evaluation.diverges_from_store(&outcomes);
+        let (number, point) = (evaluation.number, evaluation.point);
+        let workers = evaluation.workers.iter().cloned().collect();
+        let copy = outcomes.clone();
+        let record =
+            EvaluationRecord { job, number, point, outcomes: copy, estimated_error, workers };
+        gathered(Gathered { job, attempt, record, is_last });
+        drop(evaluation);
+        after.tell(outcomes, estimated_error);
+        Some(Completed { job, attempt, after })
     }
 }
 
@@ -64,6 +75,13 @@ impl Completion {
 impl PartialEq for Completion {
     fn eq(&self, other: &Self) -> bool {
         self.evaluation.attempt == other.evaluation.attempt
+    }
+}
+
+/// Attempts are numbered over all jobs, and each is gathered once.
+impl PartialEq for Gathered {
+    fn eq(&self, other: &Self) -> bool {
+        self.attempt == other.attempt
     }
 }
 

@@ -57,7 +57,7 @@ pub enum Effect {
         /// The reason.
         reason: CloseReason,
     },
-    /// Complete an evaluation, then report it with an event.
+    /// Complete an evaluation, and report both steps with an event each.
     Complete(Completion),
     /// Make a record durable, then report it with an event.
     Store(Record),

@@ -7,7 +7,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::outcome::RealizationResult;
 
 use crate::core::close_reason::CloseReason;
-use crate::core::completion::Completed;
+use crate::core::completion::{Completed, Gathered};
 use crate::core::effect::RecordKey;
 use crate::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use crate::store::EvaluationRecord;
@@ -64,7 +64,9 @@ pub enum Event {
         /// The worker.
         worker: WorkerId,
     },
-    /// An evaluation is completed.
+    /// The outcomes of an evaluation are gathered.
+    Gathered(Gathered),
+    /// The search has taken in an evaluation that was gathered.
     Completed(Completed),
     /// A record of a job is durable.
     Stored {

@@ -189,14 +189,14 @@ pub(crate) enum Stage {
         is_last: bool,
     },
     /// Evaluations that the search need only be exchanged for are being stored: they were complete
-    /// before it asked for them, or were completed beside the core.
+    /// before it asked for them, or are completed beside the core.
     StoringPrepared {
         /// The evaluations, with consecutive numbers; not empty.
         records: Vec<EvaluationRecord>,
         /// Evaluations stored after them belong to another path of the search and are deleted.
         is_last: bool,
         /// The search after them.
-        after: Box<Search>,
+        after: After,
     },
     /// Its end is being stored.
     StoringEnd(EndRecord),
@@ -214,6 +214,20 @@ impl Stage {
                 | Self::StoringEnd(_)
         )
     }
+}
+
+/// The search after evaluations that are being stored.
+#[derive(Debug)]
+pub(crate) enum After {
+    /// It has taken them in.
+    Ready(Box<Search>),
+    /// It is taking the evaluation in, beside the core.
+    Awaited {
+        /// Number of the attempt at the evaluation.
+        attempt: u64,
+        /// The evaluation is durable already.
+        durable: bool,
+    },
 }
 
 /// A settled evaluation, whose results are completed elsewhere.

@@ -63,7 +63,8 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::WorkerDrains { worker } => workers::drains(turn, worker),
         Event::Misbehaved { worker, reason } => workers::close(turn, worker, reason),
         Event::StreamEnded { worker } => workers::stream_ended(turn, worker),
-        Event::Completed(completed) => jobs::completed(turn, completed),
+        Event::Gathered(gathered) => jobs::gathered(turn, gathered),
+        Event::Completed(completed) => records::completed(turn, completed),
         Event::Stored { key: RecordKey::Ban(number), .. } => bans::stored(turn, number),
         Event::Stored { job, key } => records::on_record_stored(turn, job, key),
         Event::StoreFailed { key: RecordKey::Ban(number), error, .. } => {

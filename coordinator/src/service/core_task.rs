@@ -274,7 +274,9 @@ impl Core {
         let events = self.events.clone();
         tokio::task::spawn_blocking(move || {
             // The receiver is gone when the coordinator has stopped.
-            drop(events.blocking_send(Event::Completed(completion.run())));
+            let report = |event| drop(events.blocking_send(event));
+            let completed = completion.run(|gathered| report(Event::Gathered(gathered)));
+            completed.into_iter().map(Event::Completed).for_each(report);
         });
     }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 use osteon_common::job::JobSpecification;
 use osteon_common::results::JobResult;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::core::completion::Completion;
+use osteon_coordinator::core::completion::{Completed, Completion};
 use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::{Event, Hello, Request};
 use osteon_coordinator::core::ids::{BatchId, JobId, ReplyId, WorkerId};
@@ -42,6 +42,7 @@ enum Occurrence {
     /// A thread of a worker finishes a realization of a batch.
     Realized(WorkerId, BatchId),
     Complete(Completion),
+    Completed(Completed),
     Write(Record),
 }
 
@@ -209,7 +210,8 @@ impl Clockwork {
                 self.realized(worker, batch);
                 self.begin(worker);
             }
-            Occurrence::Complete(completion) => self.react(Event::Completed(completion.run())),
+            Occurrence::Complete(completion) => self.complete(completion),
+            Occurrence::Completed(completed) => self.react(Event::Completed(completed)),
             Occurrence::Write(record) => {
                 let event = fake::written(&mut self.store, &record);
                 if let Record::End { end, .. } = record {
@@ -255,6 +257,13 @@ impl Clockwork {
             let answer = Event::Answered { worker, batch, solved, elapsed_s };
             self.after(MESSAGE, Occurrence::Event(answer));
         }
+    }
+
+    fn complete(&mut self, completion: Completion) {
+        let mut gathered = None;
+        let completed = completion.run(|outcomes| gathered = Some(outcomes));
+        self.react(Event::Gathered(gathered.unwrap()));
+        self.after(RECORD, Occurrence::Completed(completed.unwrap()));
     }
 
     fn react(&mut self, event: Event) {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use osteon_common::parameters::Point;
 use osteon_coordinator::config::Config;
-use osteon_coordinator::core::completion::Completion;
+use osteon_coordinator::core::completion::{Completed, Completion};
 use osteon_coordinator::core::effect::{Effect, Record};
 use osteon_coordinator::core::event::{Event, Hello, Request};
 use osteon_coordinator::core::ids::{BatchId, JobId, ReplyId, WorkerId};
@@ -39,6 +39,8 @@ const MINUTES: Duration = Duration::from_secs(300);
 /// Upper limit for the workers lost over a quarantined realization: a third loss rightly fails the
 /// job.
 const LOST_ALONE_MAX: u32 = 2;
+/// Same for those on the bad node, of ten losses of any kind.
+const LOST_BAD_MAX: u32 = 6;
 
 /// A scheduled event.
 enum Occurrence {
@@ -66,6 +68,7 @@ enum Occurrence {
     /// A record reaches the disk, or fails to.
     Write(Record),
     Complete(Completion),
+    Completed(Completed),
     /// An evaluation is read.
     Read(JobId, u64),
     /// Ended jobs are deleted.
@@ -132,6 +135,7 @@ pub(crate) struct World {
     processes: u32,
     workers: BTreeMap<WorkerId, Worker>,
     lost_alone: BTreeMap<(u64, u64), u32>,
+    lost_bad: BTreeMap<(u64, u64), u32>,
     number: u64,
     counts: Counts,
 }
@@ -198,6 +202,7 @@ impl World {
             processes: 0,
             workers: BTreeMap::new(),
             lost_alone: BTreeMap::new(),
+            lost_bad: BTreeMap::new(),
             number: 1,
         };
         world.agenda.insert((TICK, 0), Occurrence::Tick);
@@ -267,9 +272,9 @@ impl World {
             }
             Occurrence::Break(worker) => {
                 let bad = self.workers.get(&worker).map(|worker| worker.bad);
-                self.counts.bad_deaths += u64::from(bad == Some(true));
                 if bad.is_none() {
-                } else if bad == Some(true) || self.may_die(worker) {
+                } else if self.may_die(worker) {
+                    self.counts.bad_deaths += u64::from(bad == Some(true));
                     self.remove_lost(worker);
                     self.react(Event::StreamEnded { worker });
                 } else {
@@ -277,7 +282,8 @@ impl World {
                 }
             }
             Occurrence::Write(record) => self.write(&record),
-            Occurrence::Complete(completion) => self.react(Event::Completed(completion.run())),
+            Occurrence::Complete(completion) => self.complete(completion),
+            Occurrence::Completed(completed) => self.react(Event::Completed(completed)),
             Occurrence::Report(event) => self.react(event),
             Occurrence::Restart => {
                 self.counts.restarts += 1;
@@ -397,6 +403,14 @@ impl World {
         self.state = state;
         sanity_check(&self.state).unwrap();
         self.apply(effects);
+    }
+
+    /// The record may be durable before the search has taken in the evaluation, and later.
+    fn complete(&mut self, completion: Completion) {
+        let mut gathered = None;
+        let completed = completion.run(|outcomes| gathered = Some(outcomes));
+        self.react(Event::Gathered(gathered.unwrap()));
+        self.within(40, Occurrence::Completed(completed.unwrap()));
     }
 
     fn react(&mut self, event: Event) {

@@ -42,18 +42,26 @@ impl World {
     }
 
     /// Returns whether the coordinator may lose this worker without a third loss over a quarantined
-    /// realization.
+    /// realization, or on the bad node without so many that a loss elsewhere rightly fails the job.
     pub(super) fn may_die(&mut self, worker: WorkerId) -> bool {
-        let holds = &self.workers[&worker].holds;
-        let Some(work) = holds.values().next().filter(|work| holds.len() == 1 && work.count == 1)
-        else {
+        let Some(key) = self.held_alone(worker) else {
             return true;
         };
-        let (seed, point) = (work.evaluation.germs.seed, work.evaluation.point);
-        let key = point.0.iter().fold(seed, |key, x| fake::mix(key ^ x.to_bits()));
-        let lost = self.lost_alone.entry((key, work.first)).or_default();
+        let (lost, most) = match self.workers[&worker].bad {
+            true => (&mut self.lost_bad, LOST_BAD_MAX),
+            false => (&mut self.lost_alone, LOST_ALONE_MAX),
+        };
+        let lost = lost.entry(key).or_default();
         *lost += 1;
-        *lost <= LOST_ALONE_MAX
+        *lost <= most
+    }
+
+    /// Returns the realization that a worker holds, if it holds nothing else.
+    fn held_alone(&self, worker: WorkerId) -> Option<(u64, u64)> {
+        let holds = &self.workers[&worker].holds;
+        let work = holds.values().next().filter(|work| holds.len() == 1 && work.count == 1)?;
+        let (seed, point) = (work.evaluation.germs.seed, work.evaluation.point);
+        Some((point.0.iter().fold(seed, |key, x| fake::mix(key ^ x.to_bits())), work.first))
     }
 
     /// Removes a lost worker; another one replaces it.

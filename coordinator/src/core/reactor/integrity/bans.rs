@@ -5,7 +5,7 @@ use crate::core::close_reason::CloseReason;
 use crate::core::effect::{Effect, Record};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{JobId, WorkerId};
-use crate::core::job::{Settled, Stage};
+use crate::core::job::{After, Settled, Stage};
 use crate::core::reactor::dispatch::{ahead, batches, speculation};
 use crate::core::reactor::lifecycle::{jobs, records, replay, workers};
 use crate::core::reactor::turn::Turn;
@@ -50,7 +50,12 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
     turn.state.changed.insert(id);
     let contributed = job.workers.contains(name);
     match &mut job.stage {
-        Stage::Computing(_) | Stage::Completing(_) | Stage::Replaying { .. } if contributed => {
+        Stage::Computing(_)
+        | Stage::Completing(_)
+        | Stage::Replaying { .. }
+        | Stage::StoringPrepared { after: After::Awaited { durable: true, .. }, .. }
+            if contributed =>
+        {
             jobs::restart(turn, id);
         }
         Stage::Computing(evaluation) if evaluation.workers.contains(name) => {

@@ -7,12 +7,12 @@ use osteon_common::results::Status;
 use osteon_common::version::Program;
 
 use crate::core::ahead::PreparedEvaluation;
-use crate::core::completion::{Completed, Completion};
+use crate::core::completion::{Completion, Gathered};
 use crate::core::effect::{Effect, Record};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::failure::RunFailure;
 use crate::core::ids::JobId;
-use crate::core::job::{Job, Settled, Stage};
+use crate::core::job::{After, Job, Settled, Stage};
 use crate::core::notice::Notice;
 use crate::core::reactor::dispatch::{ahead, batches, speculation};
 use crate::core::reactor::turn::Turn;
@@ -77,21 +77,21 @@ fn complete_aside(turn: &mut Turn, id: JobId) {
     ahead::refresh(turn, id);
 }
 
-/// Stores an evaluation that was completed beside the core.
-pub(crate) fn completed(turn: &mut Turn, completed: Completed) {
-    let Completed { job: id, attempt, record, after } = completed;
+/// Stores an evaluation while its search takes it in, beside the core.
+pub(crate) fn gathered(turn: &mut Turn, gathered: Gathered) {
+    let Gathered { job: id, attempt, record, is_last } = gathered;
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     // Anything else was begun again, or has ended, meanwhile.
-    let awaited = matches!(&job.stage, Stage::Completing(settled) if settled.attempt == attempt);
-    let Some((record, is_last)) = record.filter(|_| awaited) else {
+    if !matches!(&job.stage, Stage::Completing(settled) if settled.attempt == attempt) {
         return;
-    };
+    }
     ahead::keep_if_awaited(job, &record);
     job.progressed = turn.now;
     let records = vec![record];
     turn.effects.push(Effect::Store(Record::of_evaluations(records.clone(), is_last)));
+    let after = After::Awaited { attempt, durable: false };
     job.stage = Stage::StoringPrepared { records, is_last, after };
     ahead::refresh(turn, id);
 }
@@ -260,6 +260,7 @@ fn store_prepared(turn: &mut Turn, id: JobId) -> bool {
     }
     turn.effects.push(Effect::Store(Record::of_evaluations(records.clone(), true)));
     job.progressed = turn.now;
+    let after = After::Ready(after);
     job.stage = Stage::StoringPrepared { records, is_last: true, after };
     // Its candidates were those of another point.
     speculation::drop_all(turn, id);

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::jobs;
+use crate::core::completion::Completed;
 use crate::core::effect::{Answer, Effect, Record, RecordKey, Refusal};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::JobId;
-use crate::core::job::{EndedJob, Job, RequestName, Stage, StoreRetry};
+use crate::core::job::{After, EndedJob, Job, RequestName, Stage, StoreRetry};
 use crate::core::notice::Notice;
 use crate::core::reactor::turn::Turn;
 use crate::core::snapshot;
@@ -40,11 +41,7 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             job.workers.append(&mut record.workers);
             job.store_retry = None;
             job.search.tell(outcomes, estimated_error);
-            if job.restart_pending {
-                jobs::restart(turn, id);
-            } else {
-                jobs::advance(turn, id);
-            }
+            go_on(turn, id);
         }
         (RecordKey::Evaluation(number), Stage::StoringPrepared { records, is_last, after })
             if records.last().is_some_and(|last| last.number == number) =>
@@ -53,12 +50,14 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             let workers = records.iter_mut().map(|record| std::mem::take(&mut record.workers));
             job.workers.extend(workers.flatten());
             job.store_retry = None;
-            // The search is moved out of a stage that ends here.
-            std::mem::swap(&mut job.search, after);
-            if job.restart_pending {
-                jobs::restart(turn, id);
-            } else {
-                jobs::advance(turn, id);
+            match after {
+                After::Awaited { durable, .. } if !job.restart_pending => *durable = true,
+                After::Awaited { .. } => jobs::restart(turn, id),
+                After::Ready(after) => {
+                    // The search is moved out of a stage that ends here.
+                    std::mem::swap(&mut job.search, after);
+                    go_on(turn, id);
+                }
             }
         }
         (RecordKey::End, Stage::StoringEnd(_)) => {
@@ -71,6 +70,39 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
         _ => {}
     }
     turn.state.changed.insert(id);
+}
+
+/// Takes over the search that was told of an evaluation beside the core; the job continues if the
+/// evaluation is durable.
+pub(crate) fn completed(turn: &mut Turn, completed: Completed) {
+    let Completed { job: id, attempt, after: told } = completed;
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let Stage::StoringPrepared { after, .. } = &mut job.stage else {
+        return;
+    };
+    match after {
+        After::Awaited { attempt: awaited, durable } if *awaited == attempt => {
+            if *durable {
+                job.search = *told;
+                jobs::advance(turn, id);
+            } else {
+                *after = After::Ready(told);
+            }
+        }
+        // It was begun again meanwhile.
+        _ => {}
+    }
+}
+
+/// Continues a job whose search has taken in what was stored.
+fn go_on(turn: &mut Turn, id: JobId) {
+    if turn.state.jobs.get(&id).is_some_and(|job| job.restart_pending) {
+        jobs::restart(turn, id);
+    } else {
+        jobs::advance(turn, id);
+    }
 }
 
 /// Handles the report that a record could not be stored. A submission is refused. Any other record is

@@ -19,30 +19,72 @@ fn rig(specification: JobSpecification) -> (Rig, Completion) {
     (rig, completion.unwrap())
 }
 
-fn done(completion: Completion) -> Event {
-    Event::Completed(completion.run())
+/// Returns the events that report the two steps of a completion.
+fn steps(completion: Completion) -> [Event; 2] {
+    let mut gathered = None;
+    let completed = completion.run(|outcomes| gathered = Some(outcomes));
+    [Event::Gathered(gathered.unwrap()), Event::Completed(completed.unwrap())]
 }
 
 #[test]
 fn what_is_completed_aside_is_stored_and_ends_as_ever() {
-    let (mut aside, completion) = rig(propagation(4));
-    aside.check(done(completion.clone()), &["store job 1 evaluation 0"]);
-    let ended = aside.event(stored(1, RecordKey::Evaluation(0)));
-    assert_eq!(ended, ["store job 1 end: converged "]);
-    // The same is not taken twice.
-    aside.check(done(completion), &[]);
     let mut plain = Rig::with(4, &[4]);
     plain.event(answer(1, 1, 0, 4));
     plain.event(stored(1, RecordKey::Evaluation(0)));
     let digest = |rig: &Rig| rig.state.jobs[&JobId(1)].search.summary();
-    assert_eq!(digest(&aside), digest(&plain));
+    for durable_first in [false, true] {
+        let (mut aside, completion) = rig(propagation(4));
+        let [gathered, completed] = steps(completion);
+        aside.check(gathered.clone(), &["store job 1 evaluation 0"]);
+        let durable = stored(1, RecordKey::Evaluation(0));
+        let (one, other) =
+            if durable_first { (durable, completed.clone()) } else { (completed.clone(), durable) };
+        aside.check(one, &[]);
+        assert_eq!(aside.event(other), ["store job 1 end: converged "], "{durable_first}");
+        // The same is not taken twice.
+        aside.check(gathered, &[]);
+        aside.check(completed, &[]);
+        assert_eq!(digest(&aside), digest(&plain), "{durable_first}");
+    }
 }
 
 #[test]
 fn a_search_goes_on_with_what_was_completed_aside() {
-    let (mut rig, completion) = rig(identification(4));
-    rig.check(done(completion), &["store job 1 evaluation 0"]);
-    rig.check(stored(1, RecordKey::Evaluation(0)), &["send 1: batch 2 = 0+4"]);
+    for durable_first in [false, true] {
+        let (mut rig, completion) = rig(identification(4));
+        let [gathered, completed] = steps(completion);
+        rig.check(gathered, &["store job 1 evaluation 0"]);
+        let durable = stored(1, RecordKey::Evaluation(0));
+        let (one, other) = if durable_first { (durable, completed) } else { (completed, durable) };
+        rig.check(one, &[]);
+        rig.check(other, &["send 1: batch 2 = 0+4"]);
+    }
+}
+
+#[test]
+fn what_the_store_refuses_while_the_search_takes_it_in_is_written_again() {
+    let (mut rig, completion) = rig(propagation(4));
+    let [gathered, completed] = steps(completion);
+    rig.event(gathered);
+    let key = RecordKey::Evaluation(0);
+    rig.event(Event::StoreFailed { job: JobId(1), key, error: "full".to_owned() });
+    rig.check(completed, &[]);
+    rig.now += rig.state.config.store_retry;
+    assert!(rig.event(Event::Tick).contains(&"store job 1 evaluation 0".to_owned()));
+    assert_eq!(rig.event(stored(1, key)), ["store job 1 end: converged "]);
+}
+
+#[test]
+fn a_job_is_computed_again_if_a_worker_is_banned_after_the_evaluation_is_durable() {
+    let (mut rig, completion) = rig(propagation(4));
+    let [gathered, completed] = steps(completion);
+    rig.event(gathered);
+    rig.event(stored(1, RecordKey::Evaluation(0)));
+    let worker = WorkerName::new("node", 42, 0);
+    bans::ban(&mut Turn::new(&mut rig.state, rig.now), &worker, JobId(1), "lies".to_owned());
+    let after = rig.event(completed);
+    assert!(!after.iter().any(|effect| effect.contains("end")), "{after:?}");
+    assert_eq!(rig.state.jobs[&JobId(1)].search.evaluations(), 0);
 }
 
 #[test]
@@ -57,7 +99,9 @@ fn answers_of_a_worker_that_is_banned_meanwhile_do_not_count() {
     let (mut rig, completion) = rig(propagation(4));
     let worker = WorkerName::new("node", 42, 0);
     bans::ban(&mut Turn::new(&mut rig.state, rig.now), &worker, JobId(1), "lies".to_owned());
-    rig.check(done(completion), &[]);
+    for step in steps(completion) {
+        rig.check(step, &[]);
+    }
     let evaluation = rig.state.jobs[&JobId(1)].evaluation().unwrap();
     assert_eq!((evaluation.filled(), evaluation.queued()), (0, 4));
 }
@@ -67,12 +111,27 @@ fn a_job_that_is_cancelled_meanwhile_ends_at_once() {
     let (mut rig, completion) = rig(propagation(4));
     let ended = rig.event(request(1, Request::Cancel(JobId(1))));
     assert_eq!(ended, ["store job 1 end: cancelled "]);
-    rig.check(done(completion), &[]);
+    for step in steps(completion) {
+        rig.check(step, &[]);
+    }
+}
+
+#[test]
+fn a_job_that_is_cancelled_while_its_search_is_told_ends_after_that() {
+    let (mut rig, completion) = rig(identification(4));
+    let [gathered, completed] = steps(completion);
+    rig.event(gathered);
+    rig.check(stored(1, RecordKey::Evaluation(0)), &[]);
+    rig.check(request(1, Request::Cancel(JobId(1))), &[]);
+    assert_eq!(rig.event(completed), ["store job 1 end: cancelled "]);
 }
 
 #[test]
 fn a_stop_waits_for_what_is_being_completed() {
     let (mut rig, completion) = rig(propagation(4));
+    let [gathered, completed] = steps(completion);
     assert!(!rig.event(Event::Drain).contains(&"stop".to_owned()));
-    rig.check(done(completion), &["store job 1 evaluation 0"]);
+    rig.check(gathered, &["store job 1 evaluation 0"]);
+    rig.check(stored(1, RecordKey::Evaluation(0)), &[]);
+    rig.check(completed, &["store job 1 end: converged "]);
 }
