@@ -15,8 +15,8 @@ use crate::store::StoreError;
 
 /// Name of the copy in the store's directory, while it is being made.
 const COPY: &str = "osteon.backup";
-/// Number of pages in one piece: with pages of 4 KiB a piece is 1 MiB, which takes milliseconds.
-const PIECE_PAGES: i32 = 256;
+/// Number of pages in one piece: with pages of 16 KiB a piece is 1 MiB, which takes milliseconds.
+const PIECE_PAGES: i32 = 64;
 /// Measurements are private to their owner.
 const COPY_MODE: u32 = 0o600;
 

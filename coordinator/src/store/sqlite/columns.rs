@@ -174,10 +174,15 @@ pub(super) fn without_decays<const RECORD: usize>(
 fn unpack_outcomes(packed: &[u8]) -> Option<Outcomes> {
     let (packed, decays) = without_decays::<OUTCOME_BYTES>(packed)?;
     let (records, rest) = packed.as_chunks::<OUTCOME_BYTES>();
-    let outcome =
-        |[code, velocity @ ..]: &[u8; OUTCOME_BYTES]| decode(*code, f64::from_le_bytes(*velocity));
-    let outcomes: Option<Outcomes> =
-        rest.is_empty().then(|| records.iter().map(outcome).collect()).flatten();
+    if !rest.is_empty() {
+        return None;
+    }
+    // With room for all of them: there may be millions.
+    let mut unpacked = Vec::with_capacity(records.len());
+    for [code, velocity @ ..] in records {
+        unpacked.push(decode(*code, f64::from_le_bytes(*velocity))?);
+    }
+    let outcomes = Outcomes::from(unpacked);
     let fits = |outcomes: &Outcomes, decays: &[f64]| {
         let pairs = outcomes.iter().zip(decays);
         pairs.into_iter().all(|(outcome, decay)| match outcome {
@@ -185,8 +190,8 @@ fn unpack_outcomes(packed: &[u8]) -> Option<Outcomes> {
             Err(_) => decay.to_bits() == 0,
         })
     };
-    let outcomes = outcomes.filter(|all| decays.as_ref().is_none_or(|decays| fits(all, decays)))?;
-    Some(outcomes.with_decays(decays.map(Into::into)))
+    let consistent = decays.as_ref().is_none_or(|decays| fits(&outcomes, decays));
+    consistent.then(|| outcomes.with_decays(decays.map(Into::into)))
 }
 
 pub(super) fn pack_errors(errors: EstimatedError) -> Vec<u8> {

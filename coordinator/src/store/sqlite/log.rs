@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicI32, Ordering};
 
 use rusqlite::Connection;
 
-/// Pages in the log from which on it is copied between records.
-const DUE_PAGES: i32 = 1000;
-/// Pages in the log from which on it is copied at once: 800 MB.
-const FULL_PAGES: i32 = 200_000;
+/// Length of the log from which on it is copied between records, bytes.
+const DUE_BYTES: i64 = 4 << 20;
+/// Length of the log from which on it is copied at once, bytes.
+const FULL_BYTES: i64 = 800 << 20;
 /// Size to which a file that was longer shrinks when the log starts again, bytes.
 const FILE_BYTES: i64 = 64 << 20;
 
@@ -21,28 +21,33 @@ const FILE_BYTES: i64 = 64 << 20;
 pub(super) struct Log {
     /// In pages, as of the last record.
     pages: Arc<AtomicI32>,
+    /// Length from which on it is copied between records, in pages.
+    due: i32,
 }
 
 impl Log {
     /// Takes over the copying from SQLite.
     pub(super) fn of(connection: &mut Connection) -> rusqlite::Result<Self> {
-        Self::with_full(connection, FULL_PAGES)
+        Self::with_full(connection, FULL_BYTES)
     }
 
-    fn with_full(connection: &mut Connection, full_pages: i32) -> rusqlite::Result<Self> {
+    fn with_full(connection: &mut Connection, full_bytes: i64) -> rusqlite::Result<Self> {
+        let page: i64 = connection.pragma_query_value(None, "page_size", |row| row.get(0))?;
+        let pages_of = |bytes: i64| i32::try_from(bytes / page.max(1)).unwrap_or(i32::MAX);
+        let full = pages_of(full_bytes);
         connection.pragma_update(None, "journal_size_limit", FILE_BYTES)?;
         let pages = Arc::new(AtomicI32::new(0));
         let length = Arc::clone(&pages);
         connection.wal_hook(Some(move |log: &mut rusqlite::hooks::Wal, pages| {
             length.store(pages, Ordering::Relaxed);
-            if pages < full_pages { Ok(()) } else { log.checkpoint() }
+            if pages < full { Ok(()) } else { log.checkpoint() }
         }))?;
-        Ok(Self { pages })
+        Ok(Self { pages, due: pages_of(DUE_BYTES) })
     }
 
     /// Copies the log, if it is long.
     pub(super) fn copy(&self, connection: &Connection) -> rusqlite::Result<()> {
-        if self.pages.load(Ordering::Relaxed) < DUE_PAGES {
+        if self.pages.load(Ordering::Relaxed) < self.due {
             return Ok(());
         }
         // The next record starts the log again.
@@ -64,23 +69,23 @@ mod tests {
         let mut connection = Connection::open(&path).unwrap();
         connection.pragma_update(None, "journal_mode", "WAL").unwrap();
         connection.execute_batch("CREATE TABLE blobs (bytes BLOB)").unwrap();
-        let full_pages = 10 * DUE_PAGES;
-        let log = Log::with_full(&mut connection, full_pages).unwrap();
-        let put = |pages: i32| {
+        let full = 10 * DUE_BYTES;
+        let log = Log::with_full(&mut connection, full).unwrap();
+        let put = |bytes: i64| {
             let sql = "INSERT INTO blobs VALUES (zeroblob(?1))";
-            connection.execute(sql, [pages * 4096]).unwrap();
+            connection.execute(sql, [bytes]).unwrap();
         };
-        let copied = || fs::metadata(&path).unwrap().len() / 4096;
+        let copied = || i64::try_from(fs::metadata(&path).unwrap().len()).unwrap();
         log.copy(&connection).unwrap();
         let before = copied();
-        put(DUE_PAGES / 2);
+        put(DUE_BYTES / 2);
         log.copy(&connection).unwrap();
         assert_eq!(copied(), before, "a short log waits");
-        put(2 * DUE_PAGES);
+        put(2 * DUE_BYTES);
         assert_eq!(copied(), before, "the record is reported first");
         log.copy(&connection).unwrap();
-        assert!(copied() > 2000, "{} pages", copied());
-        put(full_pages);
-        assert!(copied() > 12_000, "{} pages", copied());
+        assert!(copied() > 2 * DUE_BYTES, "{} bytes", copied());
+        put(full);
+        assert!(copied() > full + 2 * DUE_BYTES, "{} bytes", copied());
     }
 }

@@ -453,4 +453,5 @@ fn the_modes_are_those_that_make_records_durable() {
     assert_eq!(pragma("journal_mode"), "wal".to_owned().into());
     assert_eq!(pragma("locking_mode"), "exclusive".to_owned().into());
     assert_eq!(pragma("synchronous"), 2_i64.into());
+    assert_eq!(pragma("page_size"), 16384_i64.into());
 }

@@ -131,7 +131,7 @@ impl Fault {
                 }
                 let pages: i64 =
                     store.connection.pragma_query_value(None, "page_count", |r| r.get(0)).unwrap();
-                store.connection.pragma_update(None, "max_page_count", pages + 60).unwrap();
+                store.connection.pragma_update(None, "max_page_count", pages + 30).unwrap();
             }
         }
     }
