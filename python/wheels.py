@@ -8,9 +8,10 @@ maturin builds the module; cargo-zigbuild builds the program, which is placed am
 import argparse
 import os
 import pathlib
+import platform
 import shutil
-import subprocess
 import sys
+import zipfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -46,18 +47,43 @@ def build(python, work, processor, profile):
     # cargo-zigbuild and maturin find the package ziglang by the Python of this environment.
     variables["PATH"] = f"{python.parent}{os.pathsep}{variables['PATH']}"
     variables["CARGO_TARGET_DIR"] = str(work / "target")
+    # The linker leaves out what only a debugger needs.
+    variables[f"CARGO_PROFILE_{profile.upper()}_STRIP"] = "symbols"
     zigbuild = ["cargo-zigbuild", "zigbuild", "--locked", "--package", "osteon", "--bin", "osteon"]
     run([*zigbuild, "--profile", profile, "--target", f"{target}.{GLIBC}"], ROOT, variables)
     folder = "debug" if profile == "dev" else profile
     shutil.rmtree(SCRIPTS, ignore_errors=True)
     SCRIPTS.mkdir(parents=True)
-    # maturin strips the module, and this the program, of what only a debugger needs.
     shutil.copy2(work / "target" / target / folder / "osteon", SCRIPTS / "osteon")
-    strip = [python, "-m", "ziglang", "objcopy", "--strip-all", SCRIPTS / "osteon"]
-    subprocess.run([*strip, SCRIPTS / "osteon"], check=False, capture_output=True)
+    wheels = work / "wheels"
+    shutil.rmtree(wheels / processor, ignore_errors=True)
     wheel = [python, "-m", "maturin", "build", "--zig", "--locked", "--profile", profile]
-    wheel += ["--target", target, "--compatibility", "manylinux2014", "--out", work / "wheels"]
+    wheel += ["--target", target, "--compatibility", "manylinux2014", "--out", wheels / processor]
     run(wheel, HERE, variables)
+    [built] = (wheels / processor).glob("*.whl")
+    check(built, processor, work / "trial")
+    print(f"{built}: {built.stat().st_size / 1e6:.1f} MB")
+
+
+def check(wheel, processor, trial):
+    """Fails unless the wheel holds a program for the processor; installs and uses it if this machine has that
+    processor."""
+    with zipfile.ZipFile(wheel) as files:
+        [script] = [name for name in files.namelist() if name.endswith(".data/scripts/osteon")]
+        program = files.read(script)
+    # The header of an ELF file: magic, and the processor at byte 18.
+    machine = {"x86_64": 62, "aarch64": 183}[processor]
+    if program[:4] != b"\x7fELF" or int.from_bytes(program[18:20], "little") != machine:
+        sys.exit(f"{wheel.name} holds no program for {processor}, but {len(program)} bytes of something else")
+    if platform.machine() != processor:
+        print(f"{wheel.name} is for another processor and was not tried")
+        return
+    shutil.rmtree(trial, ignore_errors=True)
+    run([sys.executable, "-m", "venv", trial])
+    run([trial / "bin" / "python", "-m", "pip", "install", "--quiet", wheel])
+    run([trial / "bin" / "osteon", "--version"])
+    use = "import osteon, sys; print(osteon.simulate(sys.argv[1]).velocity, 'm/s')"
+    run([trial / "bin" / "python", "-c", use, ROOT / "examples" / "cases" / "A.toml"])
 
 
 if __name__ == "__main__":
