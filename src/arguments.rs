@@ -1,6 +1,7 @@
 //! The command line as typed. What it means is decided in [`crate::resolved`].
 
 mod check;
+mod inputs;
 mod operators;
 mod realizations;
 mod report;
@@ -17,6 +18,7 @@ use osteon_proto::endpoint::Endpoint;
 use crate::program;
 
 pub(crate) use check::CheckArguments;
+pub(crate) use inputs::{CaseFileArguments, JobFileArguments};
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
 pub(crate) use report::ReportArguments;
@@ -97,8 +99,9 @@ pub(crate) enum Command {
 /// Arguments of `identify` and `propagate`.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
-    /// Job file (TOML or JSON)
-    pub(crate) job: PathBuf,
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
     /// Number of worker processes to start on this machine [default: 2]
     #[arg(long, value_name = "N", conflicts_with = "coordinator",
           value_parser = clap::value_parser!(u32).range(1..=256))]
@@ -122,7 +125,7 @@ pub(crate) struct RunArguments {
     pub(crate) name: Option<String>,
     /// Directory for the results. Repeating the command resumes an interrupted run, or shows the
     /// results of a complete one
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Also write a report of the results to DIR/report, as `osteon report DIR` does
     #[arg(long, requires = "out")]
@@ -157,11 +160,12 @@ pub(crate) enum ProgressFormat {
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
-    /// Case file (TOML or JSON)
-    pub(crate) case: PathBuf,
+    /// The case.
+    #[command(flatten)]
+    pub(crate) case: CaseFileArguments,
     /// Directory for the case, the result and the pressure traces (traces.csv, always computed with
     /// the exact method). Each case needs its own directory
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Also write a report of the results to DIR/report, as `osteon report DIR` does
     #[arg(long, requires = "out")]
@@ -229,8 +233,9 @@ impl ClientArguments {
 /// Arguments of `submit`.
 #[derive(Debug, Args)]
 pub(crate) struct SubmitArguments {
-    /// Job file (TOML or JSON)
-    pub(crate) job: PathBuf,
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
@@ -337,7 +342,7 @@ pub(crate) struct FetchArguments {
     #[command(flatten)]
     pub(crate) client: ClientArguments,
     /// Directory for the results
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     pub(crate) out: PathBuf,
 }
 
@@ -371,7 +376,7 @@ pub(crate) struct TokenArguments {
     #[arg(long, value_name = "ROLE", value_parser = ["read", "submit", "admin"])]
     pub(crate) role: String,
     /// Write the token to this new file, which only you can read
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     pub(crate) out: PathBuf,
     /// Append the entry to this token list (the coordinator's --tokens file) instead of printing it
     #[arg(long, value_name = "FILE")]

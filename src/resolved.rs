@@ -16,9 +16,9 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
-    CredentialArguments, DrawArguments, InitArguments, LogFormat, MaterialsArguments,
-    ObserveArguments, ProgressFormat, ReportArguments, RunArguments, SchemaArguments,
-    SimulateArguments, TokenArguments, WorkerArguments,
+    CredentialArguments, DrawArguments, InitArguments, JobFileArguments, LogFormat,
+    MaterialsArguments, ObserveArguments, ProgressFormat, ReportArguments, RunArguments,
+    SchemaArguments, SimulateArguments, TokenArguments, WorkerArguments,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::environment::{Environment, Unused};
@@ -108,7 +108,7 @@ pub(crate) enum Resolved {
     /// `submit`.
     Submit {
         /// The job file.
-        job: PathBuf,
+        job: JobFileArguments,
         /// Kind of the job.
         kind: JobKind,
         /// The request, which makes the submission idempotent.
@@ -215,12 +215,12 @@ pub(crate) enum Resolved {
 }
 
 /// One run of a job, from its job file to its result.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Run {
     /// Kind of the job.
     pub(crate) kind: JobKind,
     /// The job file.
-    pub(crate) job: PathBuf,
+    pub(crate) job: JobFileArguments,
     /// Where the job is computed.
     pub(crate) location: RunLocation,
     /// Name of the job for display; may be empty.

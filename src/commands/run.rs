@@ -28,8 +28,8 @@ use crate::{cost, report_directory, result_status, unsearched_groups, warnings};
 
 /// Runs the job, or shows the result of an earlier run.
 pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, CommandFailure> {
-    let noted =
-        job_file::read_with_warnings(&run.job, run.kind).map_err(CommandFailure::bad_input)?;
+    let input = run.job.open().map_err(CommandFailure::bad_input)?;
+    let noted = job_file::of_input(&input, run.kind).map_err(CommandFailure::bad_input)?;
     let specification = &noted.specification;
     if let Some(result) = finished(&run, specification)? {
         return show(&run, specification, &result);
@@ -40,7 +40,7 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
     if let RunLocation::Coordinator(remote) = &run.location {
         remote.announce();
     }
-    unsearched_groups::warn(&run.job, &noted);
+    unsearched_groups::warn(input.path(), &noted);
     warnings::say_of_job(specification, &noted.warnings).await;
     if let (RunLocation::Local { workers, threads }, Some(isa)) = (&run.location, isa) {
         let threads = workers.saturating_mul(*threads);
