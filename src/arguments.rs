@@ -7,6 +7,7 @@ mod realizations;
 mod report;
 mod services;
 mod slurm;
+mod tools;
 mod umbridge;
 
 use std::path::PathBuf;
@@ -26,6 +27,10 @@ pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use slurm::{
     AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
     WorkerArrayArguments,
+};
+pub(crate) use tools::{
+    CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments, SchemaArguments,
+    SchemaFile,
 };
 pub(crate) use umbridge::UmbridgeArguments;
 
@@ -94,6 +99,18 @@ pub(crate) enum Command {
     Materials(MaterialsArguments),
     /// Print the JSON Schema of a job file or of result.json
     Schema(SchemaArguments),
+    /// Examine this machine: cores, numerics, disk, limits; and a coordinator
+    ///
+    /// Each line begins with ok, warning or problem. The exit code is 1 if there is a problem, otherwise
+    /// 0.
+    Doctor(DoctorArguments),
+    /// Print a script by which a shell completes commands and options
+    ///
+    /// bash: osteon completions bash > ~/.local/share/bash-completion/completions/osteon
+    Completions(CompletionArguments),
+    /// Write the manual pages, one for each command.
+    #[command(hide = true)]
+    Man(ManArguments),
 }
 
 /// Arguments of `identify` and `propagate`.
@@ -393,36 +410,6 @@ pub(crate) struct InitArguments {
     /// New job file, or - to print it [default: the CSV file's name with .toml, or job.toml]
     #[arg(long, short = 'o', value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
-}
-
-/// Arguments of `schema`.
-#[derive(Debug, Args)]
-pub(crate) struct SchemaArguments {
-    /// `job`: job files; `result`: result.json and the output of a run with --json
-    #[arg(value_enum, value_name = "FILE")]
-    pub(crate) file: SchemaFile,
-}
-
-/// Arguments of `materials`.
-#[derive(Debug, Args)]
-pub(crate) struct MaterialsArguments {
-    /// Print values and reference of this material alone
-    #[arg(value_name = "NAME")]
-    pub(crate) name: Option<String>,
-    /// Print values and references as JSON
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// A file that has a schema.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum SchemaFile {
-    /// A job file.
-    #[value(help = None)]
-    Job,
-    /// `result.json`.
-    #[value(help = None)]
-    Result,
 }
 
 /// Longest span that a command line may ask for, s: a year.

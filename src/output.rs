@@ -19,10 +19,12 @@ use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Failure, FirstSignal, GuidedWaves, Isa};
 
 use crate::cost::JobCost;
+use crate::doctor::Diagnosis;
 use crate::observations::ObservationSummary;
 use crate::resolved::OutputFormat;
 
 pub(crate) use self::text::wrapped;
+pub(crate) use self::times::utc;
 
 /// A result to show.
 #[derive(Debug, Clone, Copy)]
@@ -107,6 +109,8 @@ pub(crate) trait Output {
     -> io::Result<()>;
     /// Prints the current state of one worker.
     fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()>;
+    /// Prints what was found on this machine.
+    fn diagnoses(&mut self, diagnoses: &[Diagnosis]) -> io::Result<()>;
     /// Prints that a coordinator serves, or why it does not.
     fn health(&mut self, not_serving: Option<&str>) -> io::Result<()>;
     /// Prints the file of a copy of a store.

@@ -15,12 +15,14 @@ use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
-    Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
-    CredentialArguments, DrawArguments, InitArguments, JobFileArguments, LogFormat,
-    MaterialsArguments, ObserveArguments, ProgressFormat, ReportArguments, RunArguments,
-    SchemaArguments, SimulateArguments, TokenArguments, WorkerArguments,
+    Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CompletionArguments,
+    CoordinatorArguments, CredentialArguments, DoctorArguments, DrawArguments, InitArguments,
+    JobFileArguments, LogFormat, ManArguments, MaterialsArguments, ObserveArguments,
+    ProgressFormat, ReportArguments, RunArguments, SchemaArguments, SimulateArguments,
+    TokenArguments, WorkerArguments,
 };
 use crate::client::{Remote, SubmitOptions};
+use crate::doctor::Patient;
 use crate::environment::{Environment, Unused};
 use crate::exit_status::CommandFailure;
 use crate::request_id::RequestId;
@@ -105,6 +107,17 @@ pub(crate) enum Resolved {
     Schema(SchemaArguments),
     /// `materials`.
     Materials(MaterialsArguments),
+    /// `doctor`.
+    Doctor {
+        /// What is examined.
+        patient: Patient,
+        /// Output format.
+        format: OutputFormat,
+    },
+    /// `completions`.
+    Completions(CompletionArguments),
+    /// `man`.
+    Man(ManArguments),
     /// `submit`.
     Submit {
         /// The job file.
@@ -297,6 +310,14 @@ impl Resolved {
             Command::Init(arguments) => Self::Init(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
             Command::Materials(arguments) => Self::Materials(arguments),
+            Command::Doctor(DoctorArguments { store, client, json }) => {
+                let named = client.coordinator.is_some() || environment.coordinator()?.is_some();
+                let coordinator = named.then(|| remote(client)).transpose()?;
+                let patient = Patient { store, coordinator, isa: isa()? };
+                Self::Doctor { patient, format: format(json) }
+            }
+            Command::Completions(arguments) => Self::Completions(arguments),
+            Command::Man(arguments) => Self::Man(arguments),
             Command::Submit(arguments) => client::submit(arguments, remote)?,
             Command::Jobs(arguments) => client::jobs(arguments, remote)?,
             Command::Workers(arguments) => client::workers(arguments, remote)?,
