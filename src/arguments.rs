@@ -30,7 +30,7 @@ pub(crate) use slurm::{
 };
 pub(crate) use tools::{
     CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments, SchemaArguments,
-    SchemaFile,
+    SchemaFile, VerbosityArguments,
 };
 pub(crate) use umbridge::UmbridgeArguments;
 
@@ -161,6 +161,9 @@ pub(crate) struct RunArguments {
         hide_possible_values = true
     )]
     pub(crate) progress: ProgressFormat,
+    /// How much is shown.
+    #[command(flatten)]
+    pub(crate) verbosity: VerbosityArguments,
 }
 
 /// Format of a run's progress on stderr.

@@ -26,6 +26,18 @@ use crate::resolved::OutputFormat;
 pub(crate) use self::text::wrapped;
 pub(crate) use self::times::utc;
 
+/// How much of a result is shown to people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Detail {
+    /// How the run ended, and its numbers.
+    Summary,
+    /// Also what they mean.
+    #[default]
+    Usual,
+    /// Also how they were computed.
+    Full,
+}
+
 /// A result to show.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ShownResult<'a> {
@@ -35,6 +47,8 @@ pub(crate) struct ShownResult<'a> {
     pub(crate) result: &'a ResultFile,
     /// Directory of the result files, if they are kept.
     pub(crate) directory: Option<&'a Path>,
+    /// How much of it is shown; programs always receive all.
+    pub(crate) detail: Detail,
 }
 
 /// A simulation to show.

@@ -19,7 +19,7 @@ use crate::arguments::{
     CoordinatorArguments, CredentialArguments, DoctorArguments, DrawArguments, InitArguments,
     JobFileArguments, LogFormat, ManArguments, MaterialsArguments, ObserveArguments,
     ProgressFormat, ReportArguments, RunArguments, SchemaArguments, SimulateArguments,
-    TokenArguments, WorkerArguments,
+    TokenArguments, VerbosityArguments, WorkerArguments,
 };
 use crate::client::{Remote, SubmitOptions};
 use crate::doctor::Patient;
@@ -246,6 +246,8 @@ pub(crate) struct Run {
     pub(crate) format: OutputFormat,
     /// Format of the progress.
     pub(crate) progress: ProgressFormat,
+    /// How much is shown.
+    pub(crate) verbosity: VerbosityArguments,
 }
 
 /// Where a job is computed.
@@ -371,6 +373,7 @@ fn resolve_run(
         report,
         json,
         progress,
+        verbosity,
     } = arguments;
     let files = CredentialFiles::from(credentials);
     let location =
@@ -384,6 +387,7 @@ fn resolve_run(
         report,
         format: format(json),
         progress,
+        verbosity,
     })
 }
 

@@ -67,3 +67,14 @@ pub(crate) enum SchemaFile {
     #[value(help = None)]
     Result,
 }
+
+/// How much a run shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Args)]
+pub(crate) struct VerbosityArguments {
+    /// Show a short summary of the result, and no progress. Warnings and errors are still shown
+    #[arg(long, short)]
+    pub(crate) quiet: bool,
+    /// Show each evaluation on stderr, and with the result how it was computed
+    #[arg(long, short, conflicts_with = "quiet")]
+    pub(crate) verbose: bool,
+}

@@ -3,6 +3,7 @@
 mod check;
 mod cost;
 mod data_notes;
+mod details;
 mod fit;
 mod groups;
 mod identified;
