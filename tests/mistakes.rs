@@ -1,6 +1,8 @@
 //! Plausible mistakes of a first day, each with the words of the message that name the cure. Every one
 //! of them ends with exit code 2, and writes nothing to stdout.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
@@ -175,8 +177,7 @@ const CASES: &[(&str, &str, Words)] = &[
 ];
 
 fn run_in(scratch: &Scratch, arguments: &[&str]) -> Finished {
-    let output = osteon().args(arguments).current_dir(scratch.path(".")).output();
-    Finished::of(output.expect("the program runs"))
+    Finished::of(osteon().args(arguments).current_dir(scratch.path(".")).output().unwrap())
 }
 
 /// Returns what is not as expected.

@@ -116,6 +116,9 @@ impl ContentError {
     }
 }
 
+/// Violations of a file that are shown with their lines; those after them have a place alone.
+const EXCERPTS_MAX: usize = 10;
+
 /// Returns `PATH:LINE:COLUMN: message`.
 fn at(path: &str, excerpt: &Excerpt, message: &str) -> String {
     format!("{path}:{}:{}: {message}", excerpt.line, excerpt.column)
@@ -192,9 +195,12 @@ impl Invalid {
     /// Returns the list for a file with this path.
     fn located(&self, path: &str) -> String {
         let mut text = self.count();
-        for (place, violation) in &self.found {
+        for (number, (place, violation)) in self.found.iter().enumerate() {
             let violation = violation.to_string();
             text.push_str(&match place {
+                ErrorPlace::Line(excerpt) if number >= EXCERPTS_MAX => {
+                    format!("\n  {}", at(path, excerpt, &violation))
+                }
                 ErrorPlace::Line(excerpt) => {
                     let message = at(path, excerpt, &violation);
                     format!("\n  {message}\n  {}", excerpt.to_string().replace('\n', "\n  "))
@@ -264,7 +270,10 @@ fn not_utf8(error: &std::string::FromUtf8Error, format: Format) -> SyntaxError {
     let byte = error.as_bytes().get(valid).copied().unwrap_or_default();
     SyntaxError {
         format,
-        excerpt: Excerpt::new(&text, valid..valid + char::REPLACEMENT_CHARACTER.len_utf8()),
+        excerpt: Box::new(Excerpt::new(
+            &text,
+            valid..valid + char::REPLACEMENT_CHARACTER.len_utf8(),
+        )),
         message: format!("the byte 0x{byte:02x} is not valid UTF-8"),
         help: Some("save the file as UTF-8".to_owned()),
     }

@@ -23,7 +23,7 @@ pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {
         let start = offset(text, line, column);
         SyntaxError {
             format: Format::Json,
-            excerpt: Excerpt::new(text, start..start + 1),
+            excerpt: Box::new(Excerpt::new(text, start..start + 1)),
             message: message.strip_suffix(&suffix).unwrap_or(&message).to_owned(),
             help: None,
         }

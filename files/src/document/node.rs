@@ -49,7 +49,7 @@ pub struct SyntaxError {
     /// The expected format.
     pub format: Format,
     /// The place.
-    pub excerpt: Excerpt,
+    pub excerpt: Box<Excerpt>,
     /// The parser's message.
     pub message: String,
     /// What to write instead, if that can be guessed.

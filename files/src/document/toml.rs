@@ -17,7 +17,7 @@ pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {
     if let Err((offset, exceeded)) = size_limits::check(text) {
         return Err(SyntaxError {
             format: Format::Toml,
-            excerpt: Excerpt::new(text, offset..offset + 1),
+            excerpt: Box::new(Excerpt::new(text, offset..offset + 1)),
             message: exceeded.to_string(),
             help: None,
         });
@@ -31,7 +31,7 @@ fn syntax_error(text: &str, error: &toml::de::Error) -> SyntaxError {
     let span = error.span().unwrap_or(0..1);
     SyntaxError {
         format: Format::Toml,
-        excerpt: Excerpt::new(text, span.clone()),
+        excerpt: Box::new(Excerpt::new(text, span.clone())),
         message: error.message().trim_end().replace('\n', "; "),
         help: cures::cure(text, span.start, error.message()),
     }
