@@ -111,7 +111,7 @@ mod tests {
         let shown = excerpt.to_string();
         assert!(shown.lines().all(|line| line.chars().count() < SHOWN_MAX + 10), "{shown}");
         assert!(
-            shown.contains("…, 1,") && shown.contains("x, 2") && shown.contains("^"),
+            shown.contains("… 1, 1,") && shown.contains("x, 2") && shown.contains("^"),
             "{shown}"
         );
     }

@@ -33,6 +33,8 @@ pub(crate) struct Reader {
     suggested: Vec<String>,
     /// Paths of unknown keys.
     unknown: Vec<String>,
+    /// The sections that the file may have.
+    sections: Vec<&'static str>,
     /// Violations that are only consequences of a misspelt key.
     repeated: Vec<Violation>,
 }
@@ -70,6 +72,7 @@ impl<'a> Table<'a> {
 impl Reader {
     /// Returns the outermost table, which may have `keys` and no others.
     pub(crate) fn root<'a>(&mut self, root: &'a Node, keys: &[&'static str]) -> Table<'a> {
+        self.sections = keys.to_vec();
         self.open(root, String::new(), keys)
     }
 
@@ -111,7 +114,13 @@ impl Reader {
                 self.violations.add_more(&path, "more unknown keys are not listed");
                 break;
             }
-            let suggestion = suggestions::of_key(&path, key, keys);
+            let suggestion = match suggestions::of_key(&path, key, keys) {
+                // A case file has none of the sections of jobs.
+                Suggestion::Section(section) if !self.sections.contains(&section) => {
+                    Suggestion::None
+                }
+                suggestion => suggestion,
+            };
             let message = match suggestion {
                 Suggestion::Key(name) => format!("unknown key; did you mean `{name}`?"),
                 Suggestion::Section(section) => {
