@@ -1,11 +1,13 @@
 //! The command line as typed. What it means is decided in [`crate::resolved`].
 
 mod check;
+mod inputs;
 mod operators;
 mod realizations;
 mod report;
 mod services;
 mod slurm;
+mod tools;
 mod umbridge;
 
 use std::path::PathBuf;
@@ -17,6 +19,7 @@ use osteon_proto::endpoint::Endpoint;
 use crate::program;
 
 pub(crate) use check::CheckArguments;
+pub(crate) use inputs::{CaseFileArguments, JobFileArguments};
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
 pub(crate) use report::ReportArguments;
@@ -24,6 +27,10 @@ pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use slurm::{
     AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
     WorkerArrayArguments,
+};
+pub(crate) use tools::{
+    CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments, SchemaArguments,
+    SchemaFile, VerbosityArguments,
 };
 pub(crate) use umbridge::UmbridgeArguments;
 
@@ -92,13 +99,26 @@ pub(crate) enum Command {
     Materials(MaterialsArguments),
     /// Print the JSON Schema of a job file or of result.json
     Schema(SchemaArguments),
+    /// Examine this machine: cores, numerics, disk, limits; and a coordinator
+    ///
+    /// Each line begins with ok, warning or problem. The exit code is 1 if there is a problem, otherwise
+    /// 0.
+    Doctor(DoctorArguments),
+    /// Print a script by which a shell completes commands and options
+    ///
+    /// bash: osteon completions bash > ~/.local/share/bash-completion/completions/osteon
+    Completions(CompletionArguments),
+    /// Write the manual pages, one for each command.
+    #[command(hide = true)]
+    Man(ManArguments),
 }
 
 /// Arguments of `identify` and `propagate`.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
-    /// Job file (TOML or JSON)
-    pub(crate) job: PathBuf,
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
     /// Number of worker processes to start on this machine [default: 2]
     #[arg(long, value_name = "N", conflicts_with = "coordinator",
           value_parser = clap::value_parser!(u32).range(1..=256))]
@@ -122,7 +142,7 @@ pub(crate) struct RunArguments {
     pub(crate) name: Option<String>,
     /// Directory for the results. Repeating the command resumes an interrupted run, or shows the
     /// results of a complete one
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Also write a report of the results to DIR/report, as `osteon report DIR` does
     #[arg(long, requires = "out")]
@@ -141,6 +161,9 @@ pub(crate) struct RunArguments {
         hide_possible_values = true
     )]
     pub(crate) progress: ProgressFormat,
+    /// How much is shown.
+    #[command(flatten)]
+    pub(crate) verbosity: VerbosityArguments,
 }
 
 /// Format of a run's progress on stderr.
@@ -157,11 +180,12 @@ pub(crate) enum ProgressFormat {
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
-    /// Case file (TOML or JSON)
-    pub(crate) case: PathBuf,
+    /// The case.
+    #[command(flatten)]
+    pub(crate) case: CaseFileArguments,
     /// Directory for the case, the result and the pressure traces (traces.csv, always computed with
     /// the exact method). Each case needs its own directory
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Also write a report of the results to DIR/report, as `osteon report DIR` does
     #[arg(long, requires = "out")]
@@ -229,8 +253,9 @@ impl ClientArguments {
 /// Arguments of `submit`.
 #[derive(Debug, Args)]
 pub(crate) struct SubmitArguments {
-    /// Job file (TOML or JSON)
-    pub(crate) job: PathBuf,
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
@@ -337,7 +362,7 @@ pub(crate) struct FetchArguments {
     #[command(flatten)]
     pub(crate) client: ClientArguments,
     /// Directory for the results
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     pub(crate) out: PathBuf,
 }
 
@@ -371,7 +396,7 @@ pub(crate) struct TokenArguments {
     #[arg(long, value_name = "ROLE", value_parser = ["read", "submit", "admin"])]
     pub(crate) role: String,
     /// Write the token to this new file, which only you can read
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     pub(crate) out: PathBuf,
     /// Append the entry to this token list (the coordinator's --tokens file) instead of printing it
     #[arg(long, value_name = "FILE")]
@@ -388,36 +413,6 @@ pub(crate) struct InitArguments {
     /// New job file, or - to print it [default: the CSV file's name with .toml, or job.toml]
     #[arg(long, short = 'o', value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
-}
-
-/// Arguments of `schema`.
-#[derive(Debug, Args)]
-pub(crate) struct SchemaArguments {
-    /// `job`: job files; `result`: result.json and the output of a run with --json
-    #[arg(value_enum, value_name = "FILE")]
-    pub(crate) file: SchemaFile,
-}
-
-/// Arguments of `materials`.
-#[derive(Debug, Args)]
-pub(crate) struct MaterialsArguments {
-    /// Print values and reference of this material alone
-    #[arg(value_name = "NAME")]
-    pub(crate) name: Option<String>,
-    /// Print values and references as JSON
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// A file that has a schema.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum SchemaFile {
-    /// A job file.
-    #[value(help = None)]
-    Job,
-    /// `result.json`.
-    #[value(help = None)]
-    Result,
 }
 
 /// Longest span that a command line may ask for, s: a year.

@@ -3,9 +3,11 @@
 mod certs;
 mod check;
 mod coordinator;
+mod doctor;
 mod draw;
 mod init;
 mod jobs;
+mod man;
 mod materials;
 mod observe;
 mod operators;
@@ -56,6 +58,11 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
         Resolved::Init(arguments) => init::write(&arguments),
         Resolved::Schema(arguments) => schema::print(&arguments),
         Resolved::Materials(arguments) => materials::print(&arguments),
+        Resolved::Doctor { patient, format } => {
+            unless_interrupted(doctor::examine(patient, format), NOTHING_LEFT).await
+        }
+        Resolved::Completions(arguments) => man::completions(&arguments),
+        Resolved::Man(arguments) => man::write(&arguments),
         Resolved::Submit { job, kind, request, options, coordinator, format } => {
             let submission = jobs::Submission { job: &job, kind, request: &request, options };
             let left = "the job may have been accepted (see `osteon jobs`)";

@@ -10,7 +10,7 @@ use osteon_files::job_file;
 use osteon_files::report::ResultFile;
 use osteon_fuzz::{bounded, damaged_text, properties, texts};
 
-use crate::output::{self, ShownResult};
+use crate::output::{self, Detail, ShownResult};
 use crate::resolved::OutputFormat;
 use crate::results_directory::{self, ResultsDirectory};
 use crate::slurm::queue;
@@ -31,7 +31,8 @@ fn check_result(json: &str) {
     let ended = bounded(json.len(), || result_status::exit_status(specification, &result));
     let cancelled = result_status::is_cancelled(&result);
     assert!(!cancelled || ended == crate::ExitStatus::RunFailed);
-    let shown = ShownResult { specification, result: &result, directory: None };
+    let shown =
+        ShownResult { specification, result: &result, directory: None, detail: Detail::Usual };
     for format in [OutputFormat::Text, OutputFormat::Json] {
         let mut bytes = Vec::new();
         let mut output = output::to_writer(format, Box::new(&mut bytes));

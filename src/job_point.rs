@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context as _, anyhow};
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::parameters::Point;
+use osteon_files::input_file::InputFile;
 use osteon_files::{job_file, report};
 
 use crate::arguments::PlaceArguments;
@@ -18,7 +19,7 @@ use crate::results_directory;
 /// If the results are not those of the job, or have no such point.
 pub(crate) fn chosen(
     place: &PlaceArguments,
-    job: &Path,
+    job: &InputFile,
     specification: &JobSpecification,
 ) -> Result<Point, CommandFailure> {
     let Some(directory) = &place.at else { return Ok(specification.start()) };
@@ -30,9 +31,14 @@ pub(crate) fn chosen(
 /// Refuses a directory whose results are not those of the job, since the realizations at its best
 /// point would be different. If one of the two has no data, as the job of a propagation, everything
 /// else is compared, which is what realizations depend on.
-fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> anyhow::Result<()> {
+fn same_job(
+    directory: &Path,
+    job: &InputFile,
+    specification: &JobSpecification,
+) -> anyhow::Result<()> {
     let there = |kind| results_directory::job_of(directory, kind);
-    let searched = job_file::read(job, JobKind::Identification).ok();
+    let searched = job_file::of_input(job, JobKind::Identification).ok();
+    let searched = searched.map(|noted| noted.specification);
     let (here, there) = match searched.zip(there(JobKind::Identification).ok()) {
         Some(both) => both,
         None => {
@@ -53,7 +59,7 @@ fn same_job(directory: &Path, job: &Path, specification: &JobSpecification) -> a
             "{} holds the results of another job than {} ({difference}); give the job that was run \
              there",
             directory.display(),
-            job.display()
+            job.path().display()
         )),
     }
 }

@@ -19,10 +19,24 @@ use osteon_solver::check::Check;
 use osteon_solver::{Arrival, Failure, FirstSignal, GuidedWaves, Isa};
 
 use crate::cost::JobCost;
+use crate::doctor::Diagnosis;
 use crate::observations::ObservationSummary;
 use crate::resolved::OutputFormat;
 
 pub(crate) use self::text::wrapped;
+pub(crate) use self::times::utc;
+
+/// How much of a result is shown to people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Detail {
+    /// How the run ended, and its numbers.
+    Summary,
+    /// Also what they mean.
+    #[default]
+    Usual,
+    /// Also how they were computed.
+    Full,
+}
 
 /// A result to show.
 #[derive(Debug, Clone, Copy)]
@@ -33,6 +47,8 @@ pub(crate) struct ShownResult<'a> {
     pub(crate) result: &'a ResultFile,
     /// Directory of the result files, if they are kept.
     pub(crate) directory: Option<&'a Path>,
+    /// How much of it is shown; programs always receive all.
+    pub(crate) detail: Detail,
 }
 
 /// A simulation to show.
@@ -107,6 +123,8 @@ pub(crate) trait Output {
     -> io::Result<()>;
     /// Prints the current state of one worker.
     fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()>;
+    /// Prints what was found on this machine.
+    fn diagnoses(&mut self, diagnoses: &[Diagnosis]) -> io::Result<()>;
     /// Prints that a coordinator serves, or why it does not.
     fn health(&mut self, not_serving: Option<&str>) -> io::Result<()>;
     /// Prints the file of a copy of a store.

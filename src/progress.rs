@@ -15,7 +15,7 @@ use serde_json::json;
 use terminal_size::{Width, terminal_size_of};
 use tracing_subscriber::fmt::MakeWriter;
 
-use crate::arguments::ProgressFormat;
+use crate::arguments::{ProgressFormat, VerbosityArguments};
 use crate::output::json::snapshot_value;
 
 pub(crate) use self::display::{JobProgress, line, span};
@@ -27,16 +27,29 @@ const LINE_INTERVAL_S: u64 = 60;
 const DRAWN_HZ: u8 = 8;
 /// Columns assumed for a terminal of unknown width.
 const WIDTH_DEFAULT: usize = 80;
+/// Columns of the time before a line.
+const TIME_WIDTH: usize = 10;
 /// Narrowest terminal for which lines are laid out.
 const WIDTH_MIN: usize = 40;
 
 /// Progress bars of this process; empty if stderr is not a terminal.
 static BARS: OnceLock<MultiProgress> = OnceLock::new();
 
+/// How the progress of a run is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ShownProgress {
+    /// Its format.
+    pub(crate) format: ProgressFormat,
+    /// How much of it.
+    pub(crate) verbosity: VerbosityArguments,
+}
+
 /// Progress of one run.
 #[derive(Debug)]
 pub(crate) struct Progress {
-    format: ProgressFormat,
+    shown: ShownProgress,
+    /// Evaluations that had been made when a line was last shown.
+    evaluations: u64,
     bar: Option<ProgressBar>,
     begun: Instant,
     last_line: Instant,
@@ -45,8 +58,9 @@ pub(crate) struct Progress {
 
 impl Progress {
     /// Starts to show the progress of this job.
-    pub(crate) fn start(specification: &JobSpecification, format: ProgressFormat) -> Self {
-        let has_bar = format == ProgressFormat::Text && io::stderr().is_terminal();
+    pub(crate) fn start(specification: &JobSpecification, shown: ShownProgress) -> Self {
+        let is_text = shown.format == ProgressFormat::Text && !shown.verbosity.quiet;
+        let has_bar = is_text && io::stderr().is_terminal();
         let bar = has_bar.then(|| {
             let bars = BARS.get_or_init(|| {
                 MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(DRAWN_HZ))
@@ -60,7 +74,7 @@ impl Progress {
         });
         let begun = Instant::now();
         let observer = Observer::new(derivatives(specification));
-        Self { format, bar, begun, last_line: begun, observer }
+        Self { shown, evaluations: 0, bar, begun, last_line: begun, observer }
     }
 
     /// Shows the progress of the job.
@@ -68,10 +82,20 @@ impl Progress {
     /// # Errors
     /// If a program was to read the progress, and has closed stderr.
     pub(crate) fn show(&mut self, snapshot: &JobSnapshot) -> io::Result<()> {
-        if self.format == ProgressFormat::Json {
+        if self.shown.format == ProgressFormat::Json {
             return writeln!(io::stderr(), "{}", json!({ "progress": snapshot_value(snapshot) }));
         }
+        let VerbosityArguments { quiet, verbose } = self.shown.verbosity;
+        if quiet {
+            return Ok(());
+        }
         let observed = self.observer.observe(snapshot, self.begun.elapsed());
+        let is_new = snapshot.evaluations > self.evaluations;
+        if verbose && is_new {
+            self.evaluations = snapshot.evaluations;
+            let time = display::span(self.begun.elapsed().as_secs_f64());
+            say(&format!("{time}: {}", line(snapshot, &observed, terminal_width() - TIME_WIDTH)));
+        }
         if let Some(bar) = &self.bar {
             bar.set_message(display::lines(snapshot, &observed, terminal_width()).join("\n"));
         } else if self.last_line.elapsed() >= Duration::from_secs(LINE_INTERVAL_S) {

@@ -15,12 +15,14 @@ use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
-    Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CoordinatorArguments,
-    CredentialArguments, DrawArguments, InitArguments, LogFormat, MaterialsArguments,
-    ObserveArguments, ProgressFormat, ReportArguments, RunArguments, SchemaArguments,
-    SimulateArguments, TokenArguments, WorkerArguments,
+    Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CompletionArguments,
+    CoordinatorArguments, CredentialArguments, DoctorArguments, DrawArguments, InitArguments,
+    JobFileArguments, LogFormat, ManArguments, MaterialsArguments, ObserveArguments,
+    ProgressFormat, ReportArguments, RunArguments, SchemaArguments, SimulateArguments,
+    TokenArguments, VerbosityArguments, WorkerArguments,
 };
 use crate::client::{Remote, SubmitOptions};
+use crate::doctor::Patient;
 use crate::environment::{Environment, Unused};
 use crate::exit_status::CommandFailure;
 use crate::request_id::RequestId;
@@ -105,10 +107,21 @@ pub(crate) enum Resolved {
     Schema(SchemaArguments),
     /// `materials`.
     Materials(MaterialsArguments),
+    /// `doctor`.
+    Doctor {
+        /// What is examined.
+        patient: Patient,
+        /// Output format.
+        format: OutputFormat,
+    },
+    /// `completions`.
+    Completions(CompletionArguments),
+    /// `man`.
+    Man(ManArguments),
     /// `submit`.
     Submit {
         /// The job file.
-        job: PathBuf,
+        job: JobFileArguments,
         /// Kind of the job.
         kind: JobKind,
         /// The request, which makes the submission idempotent.
@@ -215,12 +228,12 @@ pub(crate) enum Resolved {
 }
 
 /// One run of a job, from its job file to its result.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Run {
     /// Kind of the job.
     pub(crate) kind: JobKind,
     /// The job file.
-    pub(crate) job: PathBuf,
+    pub(crate) job: JobFileArguments,
     /// Where the job is computed.
     pub(crate) location: RunLocation,
     /// Name of the job for display; may be empty.
@@ -233,6 +246,8 @@ pub(crate) struct Run {
     pub(crate) format: OutputFormat,
     /// Format of the progress.
     pub(crate) progress: ProgressFormat,
+    /// How much is shown.
+    pub(crate) verbosity: VerbosityArguments,
 }
 
 /// Where a job is computed.
@@ -297,6 +312,14 @@ impl Resolved {
             Command::Init(arguments) => Self::Init(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
             Command::Materials(arguments) => Self::Materials(arguments),
+            Command::Doctor(DoctorArguments { store, client, json }) => {
+                let named = client.coordinator.is_some() || environment.coordinator()?.is_some();
+                let coordinator = named.then(|| remote(client)).transpose()?;
+                let patient = Patient { store, coordinator, isa: isa()? };
+                Self::Doctor { patient, format: format(json) }
+            }
+            Command::Completions(arguments) => Self::Completions(arguments),
+            Command::Man(arguments) => Self::Man(arguments),
             Command::Submit(arguments) => client::submit(arguments, remote)?,
             Command::Jobs(arguments) => client::jobs(arguments, remote)?,
             Command::Workers(arguments) => client::workers(arguments, remote)?,
@@ -350,6 +373,7 @@ fn resolve_run(
         report,
         json,
         progress,
+        verbosity,
     } = arguments;
     let files = CredentialFiles::from(credentials);
     let location =
@@ -363,6 +387,7 @@ fn resolve_run(
         report,
         format: format(json),
         progress,
+        verbosity,
     })
 }
 

@@ -76,8 +76,11 @@ fn missing_files_are_named() {
 
 #[test]
 fn malformed_toml_is_shown_by_line() {
-    check_case("[bone]\ndensity = = 1\n", &["case.toml", "line 2"]);
-    check_job(&(job(10, 1) + "[layers\n"), &["job.toml", "line"]);
+    check_case(
+        "[bone]\ndensity = = 1\n",
+        &["case.toml:2:11: not valid TOML", "\n2 | density = = 1\n  |           ^"],
+    );
+    check_job(&(job(10, 1) + "[layers\n"), &["job.toml:25:8: not valid TOML", "[layers"]);
 }
 
 #[test]
@@ -355,7 +358,7 @@ fn what_a_user_does_not_see_is_shown() {
     check(&["identify", text(&file)], &[r"exa\u{1b}[2Jct"]);
     for line in ["a\u{1b}[2J = 1\n", "a = \u{202e}\n", "\u{200b}\n", "a = 1\na = \u{9b}\n"] {
         let file = with(line);
-        check(&["identify", text(&file)], &["job.toml, line"]);
+        check(&["identify", text(&file)], &["job.toml:2", ": not valid TOML"]);
     }
     let file = scratch.write("job.json", "{\"a\u{202e}\": 1, \"a\u{202e}\": 1}");
     check(&["identify", text(&file)], &[r"a\u{202e}"]);

@@ -207,7 +207,7 @@ fn run_in(scratch: &Scratch, command: &str) {
 }
 
 /// The pages for users that show files and commands, with the least number of commands of each.
-const GUIDES: [(&str, usize); 10] = [
+const GUIDES: [(&str, usize); 11] = [
     ("docs/quick-start.md", 5),
     ("docs/tutorial.md", 3),
     ("docs/how-to-csv.md", 3),
@@ -218,6 +218,7 @@ const GUIDES: [(&str, usize); 10] = [
     ("docs/how-to-posterior.md", 1),
     ("docs/how-to-reproduce.md", 4),
     ("docs/materials.md", 5),
+    ("docs/job-files.md", 2),
 ];
 
 #[test]

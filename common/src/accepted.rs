@@ -118,10 +118,21 @@ impl Interval {
     /// Returns the message that refuses `value`.
     pub fn refusal(&self, value: f64) -> String {
         let finite = if value.is_finite() { "" } else { "finite and " };
+        let (found, question) = (written(value), self.degrees(value));
         match (self.lower, self.upper) {
-            (Edge::None, Edge::None) => format!("is {value:?}; it must be {self}"),
-            _ => format!("is {value:?}; it must be {finite}{self}"),
+            (Edge::None, Edge::None) => format!("is {found}; it must be {self}"),
+            _ => format!("is {found}; it must be {finite}{self}{question}"),
         }
+    }
+
+    /// Returns the question whether an angle is in degrees; empty if it can be no such angle.
+    fn degrees(&self, value: f64) -> String {
+        let radians = value * (std::f64::consts::PI / 180.0);
+        // Smaller ones are more probably angles that are too large.
+        if self.unit != "rad" || value.abs() < 0.5 || !self.contains(radians) {
+            return String::new();
+        }
+        format!("; did you mean {value}° ({radians:.4})?")
     }
 }
 

@@ -11,11 +11,14 @@ use osteon_common::limits;
 use osteon_common::parameters::Parameter;
 use osteon_common::plausible::PlausibleRange;
 
-use crate::document::{self, Format, Node, Value};
-use crate::file_error::{self, Bound, ContentError, FileError};
+use crate::document::{Format, Node, Value};
+use crate::document_text::DocumentText;
+use crate::file_error::{Bound, ContentError, FileError, Invalid};
+use crate::input_file::InputFile;
 use crate::job_file;
 use crate::materials::{self, Base};
 use crate::reader::{Reader, Table};
+use crate::setting::Setting;
 
 pub use crate::toml_text::case as to_toml;
 
@@ -31,14 +34,39 @@ const CONSTANTS: [Parameter; 5] = [
 /// Limit of a case file's length; one with a matrix and all keys has a few kilobytes.
 const BOUND: Bound = Bound { bytes: limits::CASE_FILE_BYTES_MAX, purpose: "any case file needs" };
 
+/// Reads the case file at `path`, or standard input if that is `-`, with `settings` that replace values
+/// of it; its extension determines the format.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn open(path: &Path, settings: Vec<Setting>) -> Result<InputFile, FileError> {
+    InputFile::open(path, BOUND, settings)
+}
+
 /// Reads and validates the case file at `path`; its extension determines the format.
 ///
 /// # Errors
 /// If the file cannot be read, is malformed, or violates a rule; all violations are reported at
 /// once.
 pub fn read(path: &Path) -> Result<Case, FileError> {
-    let (text, format) = file_error::read(path, BOUND)?;
-    parse(&text, format).map_err(|content| FileError::Content { path: path.to_owned(), content })
+    of_input(&open(path, Vec::new())?)
+}
+
+/// Validates a case file that has been opened.
+///
+/// # Errors
+/// If it is malformed, or violates a rule; all violations are reported at once.
+pub fn of_input(input: &InputFile) -> Result<Case, FileError> {
+    let path = input.path().to_owned();
+    let document = input.document();
+    match document.tree() {
+        Ok(root) if root.has("parameters") && !root.has("bone") => {
+            Err(FileError::JobForCase { path })
+        }
+        Ok(root) => of_tree(document, &root)
+            .map_err(|invalid| FileError::Content { path, content: invalid.into() }),
+        Err(error) => Err(FileError::Content { path, content: error.into() }),
+    }
 }
 
 /// Reads and validates the text of a case file.
@@ -46,19 +74,23 @@ pub fn read(path: &Path) -> Result<Case, FileError> {
 /// # Errors
 /// If the text is malformed or violates a rule; all violations are reported at once.
 pub fn parse(text: &str, format: Format) -> Result<Case, ContentError> {
-    let root = document::parse(file_error::without_byte_order_mark(text), format)?;
+    let document = DocumentText::new(text, format);
+    Ok(of_tree(document, &document.tree()?)?)
+}
+
+fn of_tree(document: DocumentText<'_>, root: &Node) -> Result<Case, Invalid> {
     let mut reader = Reader::default();
     let keys = ["layers", "probe", "picking", "solver", "bone"];
-    let table = reader.root(&root, &keys);
+    let table = reader.root(root, &keys);
     if !table.is_table() {
-        return Err(reader.refuse(&root).into());
+        return Err(reader.refuse(document, root));
     }
     let setup = job_file::setup(&mut reader, &table);
     let bone = bone(&mut reader, &table);
     check::setup(&setup, &mut reader.violations);
     match bone {
         Some(bone) if reader.violations.is_empty() => Ok(Case { setup, bone }),
-        _ => Err(reader.refuse(&root).into()),
+        _ => Err(reader.refuse(document, root)),
     }
 }
 

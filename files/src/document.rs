@@ -9,7 +9,8 @@ mod node;
 mod toml;
 
 pub use self::node::{Format, SyntaxError};
-pub(crate) use self::node::{Node, Value, position};
+pub(crate) use self::node::{Node, Value};
+pub(crate) use self::toml::FieldSpans;
 
 /// Parses a text into a tree.
 ///
@@ -19,6 +20,14 @@ pub(crate) fn parse(text: &str, format: Format) -> Result<Node, SyntaxError> {
     match format {
         Format::Toml => toml::parse(text),
         Format::Json => json::parse(text),
+    }
+}
+
+/// Finds the places of the fields of a text; a format without places has none.
+pub(crate) fn spans(text: &str, format: Format) -> FieldSpans<'_> {
+    match format {
+        Format::Toml => FieldSpans::of_toml(text),
+        Format::Json => FieldSpans::none(),
     }
 }
 
@@ -72,7 +81,12 @@ mod tests {
             Format::Toml,
             "line 2, column 5: not valid TOML: extra `=`, expected nothing",
         );
-        check("a = 1\na = 2\n", Format::Toml, "line 2, column 1: not valid TOML: duplicate key");
+        check(
+            "a = 1\na = 2\n",
+            Format::Toml,
+            "line 2, column 1: not valid TOML: duplicate key; each section and key may occur once; put the \
+             two together",
+        );
         check(
             "{\"a\": 1,\n \"a\": 2}",
             Format::Json,

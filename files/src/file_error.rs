@@ -8,6 +8,8 @@ use osteon_common::visible;
 use thiserror::Error;
 
 use crate::document::{Format, Node, SyntaxError};
+use crate::document_text::DocumentText;
+use crate::excerpt::Excerpt;
 use crate::user_file;
 
 /// Reason why a job or case file cannot be used.
@@ -24,8 +26,28 @@ pub enum FileError {
         error: std::io::Error,
     },
     /// The extension of the name denotes no known format.
-    #[error("{}: the name of a job or case file must end in .toml or .json", visible::path(path))]
+    #[error("{}", unknown_format(path))]
     UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A case file was given where a job file is needed.
+    #[error(
+        "{} is a case file, which describes one bone, and no job; `osteon simulate` solves it, and \
+         `osteon init` writes a job file",
+        visible::path(path)
+    )]
+    CaseForJob {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A job file was given where a case file is needed.
+    #[error(
+        "{} is a job file, and no case file, which describes one bone; `osteon identify` and `osteon \
+         propagate` run it, and `osteon draw` writes the case file of one of its realizations",
+        visible::path(path)
+    )]
+    JobForCase {
         /// The file.
         path: PathBuf,
     },
@@ -40,13 +62,34 @@ pub enum FileError {
         purpose: &'static str,
     },
     /// The text is refused.
-    #[error("{}{}{content}", visible::path(path), if matches!(content, ContentError::Malformed(_)) { ", " } else { ": " })]
+    #[error("{}", content.located(path))]
     Content {
         /// The file.
         path: PathBuf,
         /// The reason.
         content: ContentError,
     },
+}
+
+/// Extensions of files that contain data rather than a job.
+const OF_DATA: [&str; 6] = ["csv", "tsv", "txt", "dat", "xls", "xlsx"];
+
+fn unknown_format(path: &Path) -> String {
+    let shown = visible::path(path);
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    let extension = extension.to_ascii_lowercase();
+    if !OF_DATA.contains(&extension.as_str()) {
+        return format!("{shown}: the name of a job or case file must end in .toml or .json");
+    }
+    if extension.starts_with("xls") {
+        return format!(
+            "{shown} is a spreadsheet; save the velocities as CSV, and `osteon init FILE.csv` writes a job \
+             file for them"
+        );
+    }
+    format!(
+        "{shown} is data, and no job or case file; `osteon init {shown}` writes a job file for it"
+    )
 }
 
 /// Reason why a text is not a valid job or case.
@@ -60,43 +103,128 @@ pub enum ContentError {
     Invalid(#[from] Invalid),
 }
 
+impl ContentError {
+    /// Returns the message for the file at `path`, with the lines of the text that it is about.
+    fn located(&self, path: &Path) -> String {
+        let path = visible::path(path);
+        match self {
+            Self::Malformed(error) => {
+                format!("{}\n{}", at(&path, &error.excerpt, &error.cause()), error.excerpt)
+            }
+            Self::Invalid(invalid) => format!("{path}: {}", invalid.located(&path)),
+        }
+    }
+}
+
+/// Violations of a file that are shown with their lines; those after them have a place alone.
+const EXCERPTS_MAX: usize = 10;
+
+/// Returns `PATH:LINE:COLUMN: message`.
+fn at(path: &str, excerpt: &Excerpt, message: &str) -> String {
+    format!("{path}:{}:{}: {message}", excerpt.line, excerpt.column)
+}
+
+/// Where a violation is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum ErrorPlace {
+    /// In this line of a file.
+    Line(Excerpt),
+    /// In a setting of the command line, which is quoted.
+    Setting(String),
+    /// Somewhere.
+    Unknown,
+}
+
+impl ErrorPlace {
+    fn line(&self) -> Option<usize> {
+        match self {
+            Self::Line(excerpt) => Some(excerpt.line),
+            Self::Setting(_) | Self::Unknown => None,
+        }
+    }
+}
+
 /// All violations of a well-formed text, in the order of its lines.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub struct Invalid {
-    found: Vec<(Option<usize>, Violation)>,
+    found: Vec<(ErrorPlace, Violation)>,
 }
 
 impl Invalid {
     /// Returns the violations, each with the line of the field, or of the table where it should be;
     /// without line if the format provides none, or if no such table exists.
     pub fn iter(&self) -> impl Iterator<Item = (Option<usize>, &Violation)> {
-        self.found.iter().map(|(line, violation)| (*line, violation))
+        self.found.iter().map(|(place, violation)| (place.line(), violation))
     }
 
-    /// Adds the lines of `root` to `violations`.
-    pub(crate) fn locate<'v>(violations: impl Iterator<Item = &'v Violation>, root: &Node) -> Self {
-        let locate = |violation: &Violation| (root.line_of(&violation.field), violation.clone());
+    /// Adds the places in `document`, whose tree is `root`, to `violations`; those of `unknown` keys
+    /// are the keys themselves.
+    pub(crate) fn locate<'v>(
+        violations: impl Iterator<Item = &'v Violation>,
+        unknown: &[String],
+        document: DocumentText<'_>,
+        root: &Node,
+    ) -> Self {
+        let spans = document.spans();
+        let place = |field: &String| {
+            if let Some(setting) = document.setting_of(field) {
+                return ErrorPlace::Setting(setting.to_string());
+            }
+            // Only the tree knows which tables have no line of their own.
+            let span = root.line_of(field).and_then(|_| spans.span(field, unknown.contains(field)));
+            span.map_or(ErrorPlace::Unknown, |span| ErrorPlace::Line(document.excerpt(span)))
+        };
+        let locate = |violation: &Violation| (place(&violation.field), violation.clone());
         let mut found: Vec<_> = violations.map(locate).collect();
         // The sort is stable: violations of one line stay in the order in which they were found.
         // Those without line come last.
-        found.sort_by_key(|(line, _)| line.unwrap_or(usize::MAX));
+        found.sort_by_key(|(place, _)| place.line().unwrap_or(usize::MAX));
         Self { found }
+    }
+
+    /// Returns how many violations there are.
+    fn count(&self) -> String {
+        let listed = self.found.iter().filter(|(_, violation)| !violation.more).count();
+        let errors = if listed == 1 { "error" } else { "errors" };
+        if listed < self.found.len() {
+            return format!("more than {listed} {errors} (the first {listed} of them shown)");
+        }
+        format!("{listed} {errors}")
+    }
+
+    /// Returns the list for a file with this path.
+    fn located(&self, path: &str) -> String {
+        let mut text = self.count();
+        for (number, (place, violation)) in self.found.iter().enumerate() {
+            let violation = violation.to_string();
+            text.push_str(&match place {
+                ErrorPlace::Line(excerpt) if number >= EXCERPTS_MAX => {
+                    format!("\n  {}", at(path, excerpt, &violation))
+                }
+                ErrorPlace::Line(excerpt) => {
+                    let message = at(path, excerpt, &violation);
+                    format!("\n  {message}\n  {}", excerpt.to_string().replace('\n', "\n  "))
+                }
+                ErrorPlace::Setting(option) => {
+                    format!("\n  {}: {violation}", visible::line(option))
+                }
+                ErrorPlace::Unknown => format!("\n  {violation}"),
+            });
+        }
+        text
     }
 }
 
 impl fmt::Display for Invalid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let listed = self.found.iter().filter(|(_, violation)| !violation.more).count();
-        let errors = if listed == 1 { "error" } else { "errors" };
-        if listed < self.found.len() {
-            write!(f, "more than {listed} {errors} (the first {listed} of them shown)")?;
-        } else {
-            write!(f, "{listed} {errors}")?;
-        }
-        for (line, violation) in &self.found {
-            match line {
-                Some(line) => write!(f, "\n  line {line}: {violation}")?,
-                None => write!(f, "\n  {violation}")?,
+        f.write_str(&self.count())?;
+        for (place, violation) in &self.found {
+            match place {
+                ErrorPlace::Line(excerpt) => write!(f, "\n  line {}: {violation}", excerpt.line)?,
+                ErrorPlace::Setting(option) => {
+                    write!(f, "\n  {}: {violation}", visible::line(option))?
+                }
+                ErrorPlace::Unknown => write!(f, "\n  {violation}")?,
             }
         }
         Ok(())
@@ -118,13 +246,7 @@ pub(crate) fn read(path: &Path, bound: Bound) -> Result<(String, Format), FileEr
         return Err(FileError::UnknownFormat { path: path.to_owned() });
     };
     match user_file::read(path, bound.bytes) {
-        Ok(Some(bytes)) => match String::from_utf8(bytes) {
-            Ok(text) => Ok((text, format)),
-            Err(error) => Err(FileError::Content {
-                path: path.to_owned(),
-                content: ContentError::Malformed(not_utf8(error, format)),
-            }),
-        },
+        Ok(Some(bytes)) => utf8(bytes, format, path).map(|text| (text, format)),
         Ok(None) => {
             let Bound { bytes: max_bytes, purpose } = bound;
             Err(FileError::TooLarge { path: path.to_owned(), max_bytes, purpose })
@@ -133,20 +255,26 @@ pub(crate) fn read(path: &Path, bound: Bound) -> Result<(String, Format), FileEr
     }
 }
 
-fn not_utf8(error: std::string::FromUtf8Error, format: Format) -> SyntaxError {
+/// Returns the text of the file at `path`.
+pub(crate) fn utf8(bytes: Vec<u8>, format: Format, path: &Path) -> Result<String, FileError> {
+    String::from_utf8(bytes).map_err(|error| {
+        let content = ContentError::Malformed(not_utf8(&error, format));
+        FileError::Content { path: path.to_owned(), content }
+    })
+}
+
+fn not_utf8(error: &std::string::FromUtf8Error, format: Format) -> SyntaxError {
     let valid = error.utf8_error().valid_up_to();
-    let before = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
-    let (line, column) = crate::document::position(&before, valid);
+    // What is valid keeps its length.
+    let text = String::from_utf8_lossy(error.as_bytes());
     let byte = error.as_bytes().get(valid).copied().unwrap_or_default();
     SyntaxError {
         format,
-        line,
-        column,
+        excerpt: Box::new(Excerpt::new(
+            &text,
+            valid..valid + char::REPLACEMENT_CHARACTER.len_utf8(),
+        )),
         message: format!("the byte 0x{byte:02x} is not valid UTF-8"),
+        help: Some("save the file as UTF-8".to_owned()),
     }
-}
-
-/// Returns a text without its byte order mark, if it has one.
-pub(crate) fn without_byte_order_mark(text: &str) -> &str {
-    text.strip_prefix('\u{feff}').unwrap_or(text)
 }

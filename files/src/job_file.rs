@@ -20,9 +20,12 @@ use osteon_common::limits;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::warnings::{self, Warning};
 
-use crate::document::{self, Format};
-use crate::file_error::{self, Bound, ContentError, FileError};
+use crate::document::{Format, Node};
+use crate::document_text::DocumentText;
+use crate::file_error::{Bound, ContentError, FileError, Invalid};
+use crate::input_file::InputFile;
 use crate::reader::{self, Reader, Table};
+use crate::setting::Setting;
 
 pub use self::key_tables::{job_table, setup_table};
 pub use self::purpose::{FilePurpose, purpose};
@@ -59,15 +62,37 @@ pub struct JobWithWarnings {
     pub velocities_file: Option<PathBuf>,
 }
 
+/// Reads the job file at `path`, or standard input if that is `-`, with `settings` that replace values of
+/// it; its extension determines the format.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn open(path: &Path, settings: Vec<Setting>) -> Result<InputFile, FileError> {
+    InputFile::open(path, BOUND, settings)
+}
+
 /// Reads a job file as [`read`] does, and also returns warnings and notes.
 ///
 /// # Errors
 /// Same as [`read`].
 pub fn read_with_warnings(path: &Path, kind: JobKind) -> Result<JobWithWarnings, FileError> {
-    let (text, format) = file_error::read(path, BOUND)?;
-    let directory = path.parent().unwrap_or(Path::new(""));
-    parse_with_warnings(&text, format, directory, kind)
-        .map_err(|content| FileError::Content { path: path.to_owned(), content })
+    of_input(&open(path, Vec::new())?, kind)
+}
+
+/// Validates a job file that has been opened.
+///
+/// # Errors
+/// If it is malformed, describes a case, or violates a rule; all violations are reported at once.
+pub fn of_input(input: &InputFile, kind: JobKind) -> Result<JobWithWarnings, FileError> {
+    let path = || input.path().to_owned();
+    let content = |content| FileError::Content { path: path(), content };
+    let document = input.document();
+    let root = document.tree().map_err(|error| content(error.into()))?;
+    if purpose::of_tree(&root) == FilePurpose::Case {
+        return Err(FileError::CaseForJob { path: path() });
+    }
+    let read = of_tree(document, &root, input.directory(), kind);
+    read.map_err(|invalid| content(invalid.into()))
 }
 
 /// Reads and validates the text of a job file in `directory`; otherwise the same as [`read`].
@@ -93,16 +118,17 @@ pub fn parse(
     directory: &Path,
     kind: JobKind,
 ) -> Result<JobSpecification, ContentError> {
-    parse_with_warnings(text, format, directory, kind).map(|noted| noted.specification)
+    let document = DocumentText::new(text, format);
+    let noted = of_tree(document, &document.tree()?, directory, kind)?;
+    Ok(noted.specification)
 }
 
-fn parse_with_warnings(
-    text: &str,
-    format: Format,
+fn of_tree(
+    document: DocumentText<'_>,
+    root: &Node,
     directory: &Path,
     kind: JobKind,
-) -> Result<JobWithWarnings, ContentError> {
-    let root = document::parse(file_error::without_byte_order_mark(text), format)?;
+) -> Result<JobWithWarnings, Invalid> {
     let mut reader = Reader::default();
     let keys = [
         "layers",
@@ -117,9 +143,9 @@ fn parse_with_warnings(
         "search",
         PosteriorSettings::KEY.name,
     ];
-    let table = reader.root(&root, &keys);
+    let table = reader.root(root, &keys);
     if !table.is_table() {
-        return Err(reader.refuse(&root).into());
+        return Err(reader.refuse(document, root));
     }
     let setup = setup(&mut reader, &table);
     let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
@@ -146,7 +172,7 @@ fn parse_with_warnings(
         check::posterior(&specification, &unused, &mut reader.violations);
     }
     if !reader.violations.is_empty() {
-        return Err(reader.refuse(&root).into());
+        return Err(reader.refuse(document, root));
     }
     let warnings = warnings::job_warnings_from(&specification, origin.as_ref());
     let velocities_file = origin.map(|origin| origin.path().to_owned());

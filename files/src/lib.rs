@@ -9,14 +9,18 @@
 
 pub mod case_file;
 pub mod document;
+mod document_text;
+pub mod excerpt;
 pub mod file_error;
 pub mod init;
+pub mod input_file;
 pub mod job_file;
 pub mod materials;
 pub mod posterior_csv;
 mod reader;
 pub mod report;
 pub mod results_csv;
+pub mod setting;
 mod toml_text;
 pub mod user_file;
 mod velocities;

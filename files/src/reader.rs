@@ -4,6 +4,7 @@
 //! that do not come from a file.
 
 mod section;
+mod suggestions;
 
 use std::fmt;
 use std::slice;
@@ -13,7 +14,10 @@ use osteon_common::fields::{Choice, WholeRange};
 use osteon_common::violations::{Violation, Violations};
 
 use crate::document::{Node, Value};
+use crate::document_text::DocumentText;
 use crate::file_error::Invalid;
+
+use self::suggestions::Suggestion;
 
 pub(crate) use self::section::section;
 
@@ -27,6 +31,10 @@ pub(crate) struct Reader {
     pub(crate) violations: Violations,
     /// Paths of known keys that an unknown key was assumed to mean.
     suggested: Vec<String>,
+    /// Paths of unknown keys.
+    unknown: Vec<String>,
+    /// The sections that the file may have.
+    sections: Vec<&'static str>,
     /// Violations that are only consequences of a misspelt key.
     repeated: Vec<Violation>,
 }
@@ -64,6 +72,7 @@ impl<'a> Table<'a> {
 impl Reader {
     /// Returns the outermost table, which may have `keys` and no others.
     pub(crate) fn root<'a>(&mut self, root: &'a Node, keys: &[&'static str]) -> Table<'a> {
+        self.sections = keys.to_vec();
         self.open(root, String::new(), keys)
     }
 
@@ -105,13 +114,30 @@ impl Reader {
                 self.violations.add_more(&path, "more unknown keys are not listed");
                 break;
             }
-            let nearest = nearest_key(key, keys);
-            let message = match nearest {
-                Some(name) => format!("unknown key; did you mean `{name}`?"),
-                None => format!("unknown key; known here: {}", keys.join(", ")),
+            let suggestion = match suggestions::of_key(&path, key, keys) {
+                // A case file has none of the sections of jobs.
+                Suggestion::Section(section) if !self.sections.contains(&section) => {
+                    Suggestion::None
+                }
+                suggestion => suggestion,
+            };
+            let message = match suggestion {
+                Suggestion::Key(name) => format!("unknown key; did you mean `{name}`?"),
+                Suggestion::Section(section) => {
+                    format!("unknown key; `{key}` belongs to the section [{section}]")
+                }
+                Suggestion::OfCase => {
+                    "unknown key; case files have [bone], and job files [parameters]".to_owned()
+                }
+                Suggestion::None => format!("unknown key; known here: {}", keys.join(", ")),
             };
             self.violations.add(entry_path(&path, key), message);
-            self.suggested.extend(nearest.map(|name| entry_path(&path, name)));
+            self.unknown.push(entry_path(&path, key));
+            match suggestion {
+                Suggestion::Key(name) => self.suggested.push(entry_path(&path, name)),
+                Suggestion::Section(section) => self.suggested.push(entry_path(section, key)),
+                Suggestion::OfCase | Suggestion::None => {}
+            }
         }
         Table { path, entries, is_table: true }
     }
@@ -138,10 +164,10 @@ impl Reader {
         self.lacks(&path, slice::from_ref(&path), format!("is missing; it must be {expected}"));
     }
 
-    /// Returns all violations, each mistake once, with its line in `root`.
-    pub(crate) fn refuse(&self, root: &Node) -> Invalid {
+    /// Returns all violations, each mistake once, with its place in `document`, whose tree is `root`.
+    pub(crate) fn refuse(&self, document: DocumentText<'_>, root: &Node) -> Invalid {
         let once = |violation: &&Violation| !self.repeated.contains(violation);
-        Invalid::locate(self.violations.iter().filter(once), root)
+        Invalid::locate(self.violations.iter().filter(once), &self.unknown, document, root)
     }
 
     /// Reads the number `key`; an integer is accepted.
@@ -192,7 +218,9 @@ impl Reader {
             return self.wrong_type(table.path(key), &names, &node.value);
         };
         if !field.choose(text) {
-            let message = format!("is {}; it must be {names}", quoted(text));
+            let meant = suggestions::of_choice(text, &field.names());
+            let meant = meant.map(|meant| format!("; {meant}")).unwrap_or_default();
+            let message = format!("is {}; it must be {names}{meant}", quoted(text));
             self.violations.add(table.path(key), message);
         }
     }
@@ -284,8 +312,22 @@ impl Reader {
 
     /// Records that a value has the wrong type.
     pub(crate) fn wrong_type(&mut self, path: String, expected: &str, found: &Value) {
-        self.violations.add(path, format!("is {found}; it must be {expected}"));
+        let cure = match found {
+            Value::Text(text) if expected.contains("number") => {
+                suggestions::of_number_in_quotes(text)
+            }
+            Value::Number(number) if expected.contains("whole number") => whole(*number),
+            _ => None,
+        };
+        let cure = cure.map(|cure| format!("; {cure}")).unwrap_or_default();
+        self.violations.add(path, format!("is {found}; it must be {expected}{cure}"));
     }
+}
+
+/// Returns how to write a whole number that was written with a fraction or an exponent.
+fn whole(number: f64) -> Option<String> {
+    let is_whole = number.fract() == 0.0 && (0.0..1e15).contains(&number);
+    is_whole.then(|| format!("write {number}"))
 }
 
 fn as_number(value: &Value) -> Option<f64> {
@@ -296,20 +338,4 @@ fn as_number(value: &Value) -> Option<f64> {
         Value::Integer(integer) => Some(integer as f64),
         _ => None,
     }
-}
-
-/// Minimum similarity of two keys (Jaro-Winkler) for one to count as a misspelling of the other.
-const LIKENESS_MIN: f64 = 0.7;
-/// Longer keys are not considered as misspellings.
-const MISSPELT_BYTES_MAX: usize = 64;
-
-/// Returns the known key that `key` is most probably meant to be.
-fn nearest_key(key: &str, known: &[&'static str]) -> Option<&'static str> {
-    if key.len() > MISSPELT_BYTES_MAX {
-        return None;
-    }
-    let lower = key.to_lowercase();
-    let likeness = known.iter().map(|&name| (strsim::jaro_winkler(&lower, name), name));
-    let nearest = likeness.max_by(|a, b| a.0.total_cmp(&b.0));
-    nearest.filter(|&(likeness, _)| likeness >= LIKENESS_MIN).map(|(_, name)| name)
 }

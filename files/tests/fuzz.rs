@@ -9,6 +9,7 @@ use std::path::Path;
 use osteon_common::job::JobKind;
 use osteon_files::document::Format;
 use osteon_files::report::ResultFile;
+use osteon_files::setting::Setting;
 use osteon_files::{case_file, job_file};
 use osteon_fuzz::{bounded, bytes, damaged, damaged_text, properties, texts};
 
@@ -77,6 +78,24 @@ fn check_velocities(csv: &[u8]) {
             }
             Err(error) => check_refusal(&error),
         }
+    }
+}
+
+/// Of a file the lines are shown, too.
+fn check_file(text: &str) {
+    let directory = tempfile::tempdir().unwrap();
+    for format in FORMATS {
+        let path = directory.path().join(format!("job.{}", format.name().to_lowercase()));
+        fs::write(&path, text).unwrap();
+        if let Err(error) = bounded(text.len(), || job_file::read(&path, JobKind::Identification)) {
+            check_refusal(&error);
+        }
+    }
+}
+
+fn check_setting(text: &str) {
+    if let Err(error) = bounded(text.len(), || Setting::parse(text)) {
+        check_refusal(&error);
     }
 }
 
@@ -158,6 +177,7 @@ fn large_files_take_no_more_than_their_share() {
         check_job(&text);
         check_case(&text);
         check_result(&text);
+        check_file(&text);
     }
 }
 
@@ -185,6 +205,15 @@ properties! {
 
     fn damaged_cases_are_read_or_refused(text in damaged_text(texts("cases"))) {
         check_case(&text);
+    }
+
+    fn damaged_files_are_read_or_refused(text in damaged_text(texts("jobs"))) {
+        check_file(&text);
+    }
+
+    fn damaged_settings_are_read_or_refused(text in damaged_text(texts("jobs"))) {
+        check_setting(&text);
+        text.lines().take(20).for_each(check_setting);
     }
 
     fn damaged_velocities_are_read_or_refused(csv in damaged(bytes("velocities"))) {

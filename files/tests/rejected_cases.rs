@@ -134,16 +134,22 @@ fn files_that_cannot_be_read() {
         assert_eq!(message.replace(&*directory.path().to_string_lossy(), "DIR"), expected);
     };
     check("a.toml", None, "cannot read DIR/a.toml: No such file or directory (os error 2)");
-    check("a.txt", None, "DIR/a.txt: the name of a job or case file must end in .toml or .json");
+    check("a.cfg", None, "DIR/a.cfg: the name of a job or case file must end in .toml or .json");
+    check(
+        "a.txt",
+        None,
+        "DIR/a.txt is data, and no job or case file; `osteon init DIR/a.txt` writes a job file for it",
+    );
     check(
         "b.toml",
         Some(b"[bone]\n# \xff\n"),
-        "DIR/b.toml, line 2, column 3: not valid TOML: the byte 0xff is not valid UTF-8",
+        "DIR/b.toml:2:3: not valid TOML: the byte 0xff is not valid UTF-8; save the file as UTF-8\n  |\n\
+         2 | # �\n  |   ^",
     );
     check(
         "c.json",
         Some(b"{"),
-        "DIR/c.json, line 1, column 1: not valid JSON: EOF while parsing an object",
+        "DIR/c.json:1:1: not valid JSON: EOF while parsing an object\n  |\n1 | {\n  | ^",
     );
     check(
         "d.TOML",

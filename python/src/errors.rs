@@ -43,7 +43,10 @@ pub(crate) fn of_file(error: &FileError) -> PyErr {
             exception(py, "InputError", (message, violations(content)))
         }
         FileError::Unreadable { .. } => exception(py, "UnreadableFileError", (message,)),
-        FileError::UnknownFormat { .. } | FileError::TooLarge { .. } => {
+        FileError::UnknownFormat { .. }
+        | FileError::CaseForJob { .. }
+        | FileError::JobForCase { .. }
+        | FileError::TooLarge { .. } => {
             exception(py, "InputError", (message, Vec::<PlainViolation>::new()))
         }
     })

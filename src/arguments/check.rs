@@ -1,16 +1,17 @@
 //! The arguments of `check`.
 
-use std::path::PathBuf;
-
 use clap::Args;
+
+use super::JobFileArguments;
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArguments {
-    /// Job file (TOML or JSON). It is checked as for `identify` if it has data, otherwise as for
-    /// `propagate`
-    pub(crate) job: PathBuf,
-    /// Check the job as for `propagate`, even if it has data
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
+    /// Check the job as for `propagate`, even if it has data. Without this option it is checked as
+    /// for `identify` if it has data
     #[arg(long)]
     pub(crate) propagate: bool,
     /// Print the estimate as JSON

@@ -4,11 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::JobFileArguments;
+
 /// Arguments of `draw`.
 #[derive(Debug, Args)]
 pub(crate) struct DrawArguments {
-    /// Job file (TOML or JSON)
-    pub(crate) job: PathBuf,
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
     /// Index of the realization, from 0
     #[arg(long, value_name = "I")]
     pub(crate) index: u64,
@@ -31,8 +34,9 @@ pub(crate) struct PlaceArguments {
 /// Arguments of `observe`.
 #[derive(Debug, Args)]
 pub(crate) struct ObserveArguments {
-    /// Job file (TOML or JSON)
-    pub(crate) job: PathBuf,
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
     /// The point.
     #[command(flatten)]
     pub(crate) place: PlaceArguments,
@@ -40,7 +44,7 @@ pub(crate) struct ObserveArguments {
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,
     /// New CSV file with one row for each realization
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
     /// Print the summary as JSON
     #[arg(long)]

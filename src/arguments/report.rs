@@ -11,6 +11,6 @@ pub(crate) struct ReportArguments {
     #[arg(value_name = "DIR", required = true, num_args = 1..=16)]
     pub(crate) directories: Vec<PathBuf>,
     /// Directory for the report [default: the folder report in the first DIR]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

@@ -1,18 +1,18 @@
 //! Arguments of `umbridge`.
 
 use std::net::IpAddr;
-use std::path::PathBuf;
 
 use clap::Args;
 use osteon_proto::endpoint::Endpoint;
 
-use super::CredentialArguments;
+use super::{CredentialArguments, JobFileArguments};
 
 /// Arguments of `umbridge`.
 #[derive(Debug, Args)]
 pub(crate) struct UmbridgeArguments {
-    /// Job file (TOML or JSON)
-    pub(crate) job: PathBuf,
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
     /// Port to listen on; 0 selects a free one [env: PORT] [default: 4242]
     #[arg(long, value_name = "PORT")]
     pub(crate) port: Option<u16>,

@@ -1,8 +1,6 @@
 //! `check`: reads a job as the commands that run it do, and estimates what it costs.
 
-use anyhow::anyhow;
 use osteon_common::job::JobKind;
-use osteon_common::visible;
 use osteon_files::job_file::{self, FilePurpose};
 use osteon_solver::Isa;
 
@@ -19,19 +17,14 @@ pub(super) async fn check(
     cores: u32,
 ) -> Result<ExitStatus, CommandFailure> {
     let CheckArguments { job, propagate, json } = arguments;
-    let kind = match job_file::purpose(&job).map_err(CommandFailure::bad_input)? {
-        FilePurpose::Case => {
-            return Err(CommandFailure::bad_input(anyhow!(
-                "{} is a case file, which describes one bone, and no job; `osteon simulate` solves it",
-                visible::path(&job)
-            )));
-        }
-        FilePurpose::Job(_) if propagate => JobKind::Propagation,
-        FilePurpose::Job(kind) => kind,
+    let input = job.open().map_err(CommandFailure::bad_input)?;
+    let kind = match job_file::purpose(&input).map_err(CommandFailure::bad_input)? {
+        FilePurpose::Job(kind) if !propagate => kind,
+        FilePurpose::Job(_) | FilePurpose::Case => JobKind::Propagation,
     };
-    let noted = job_file::read_with_warnings(&job, kind).map_err(CommandFailure::bad_input)?;
+    let noted = job_file::of_input(&input, kind).map_err(CommandFailure::bad_input)?;
     let specification = &noted.specification;
-    unsearched_groups::warn(&job, &noted);
+    unsearched_groups::warn(input.path(), &noted);
     warnings::say_of_job(specification, &noted.warnings).await;
     let cost = JobCost::measure(specification, isa, Effort::THOROUGH, cores).await;
     let shown = ShownCost { specification, cost: &cost, isa };

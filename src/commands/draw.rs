@@ -13,8 +13,10 @@ use crate::resolved::OutputFormat;
 
 /// Prints the case file.
 pub(super) fn draw(arguments: &DrawArguments) -> Result<ExitStatus, CommandFailure> {
-    let specification =
-        job_file::read(&arguments.job, JobKind::Propagation).map_err(CommandFailure::bad_input)?;
+    let input = arguments.job.open().map_err(CommandFailure::bad_input)?;
+    let noted =
+        job_file::of_input(&input, JobKind::Propagation).map_err(CommandFailure::bad_input)?;
+    let specification = noted.specification;
     let (index, count) = (arguments.index, specification.monte_carlo.realizations);
     if index >= count {
         return Err(CommandFailure::bad_input(anyhow!(
@@ -22,7 +24,7 @@ pub(super) fn draw(arguments: &DrawArguments) -> Result<ExitStatus, CommandFailu
             count - 1
         )));
     }
-    let point = job_point::chosen(&arguments.place, &arguments.job, &specification)?;
+    let point = job_point::chosen(&arguments.place, &input, &specification)?;
     let ensemble = specification.ensemble(&point).map_err(CommandFailure::bad_input)?;
     let bone = ensemble.bone(index).map_err(|error| {
         CommandFailure::failed(anyhow::Error::new(error).context(format!(

@@ -12,6 +12,7 @@ use osteon_files::report::ResultFile;
 use osteon_proto::v1::JobSnapshot;
 use tonic::Code;
 
+use crate::arguments::JobFileArguments;
 use crate::client::{self, Client, ClientError, Fetched, Remote, SubmitOptions};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
@@ -26,7 +27,7 @@ const LINE_INTERVAL: Duration = Duration::from_secs(1);
 /// A job to be submitted to a coordinator.
 pub(super) struct Submission<'a> {
     /// The job file.
-    pub(super) job: &'a Path,
+    pub(super) job: &'a JobFileArguments,
     /// Kind of the job.
     pub(super) kind: JobKind,
     /// The request, which makes the submission idempotent.
@@ -42,8 +43,9 @@ pub(super) async fn submit(
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
     let Submission { job, kind, request, options } = submission;
-    let noted = job_file::read_with_warnings(job, kind).map_err(CommandFailure::bad_input)?;
-    unsearched_groups::warn(job, &noted);
+    let input = job.open().map_err(CommandFailure::bad_input)?;
+    let noted = job_file::of_input(&input, kind).map_err(CommandFailure::bad_input)?;
+    unsearched_groups::warn(input.path(), &noted);
     warnings::say_of_job(&noted.specification, &noted.warnings).await;
     let mut client = Client::connect(coordinator).await?;
     let id = client.submit(&noted.specification, request, options).await?;

@@ -19,9 +19,11 @@ pub(super) async fn observe(
     threads: u32,
 ) -> Result<ExitStatus, CommandFailure> {
     let ObserveArguments { job, place, threads: _, out, json } = arguments;
-    let specification =
-        job_file::read(&job, JobKind::Propagation).map_err(CommandFailure::bad_input)?;
-    let point = job_point::chosen(&place, &job, &specification)?;
+    let input = job.open().map_err(CommandFailure::bad_input)?;
+    let noted =
+        job_file::of_input(&input, JobKind::Propagation).map_err(CommandFailure::bad_input)?;
+    let specification = noted.specification;
+    let point = job_point::chosen(&place, &input, &specification)?;
     if let Some(out) = &out {
         new_files::refuse_existing(out)?;
     }

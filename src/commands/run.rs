@@ -13,13 +13,13 @@ use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::v1::JobSnapshot;
 use osteon_solver::Isa;
 
-use crate::arguments::ProgressFormat;
+use crate::arguments::VerbosityArguments;
 use crate::client::{Client, Fetched, Remote, SubmitOptions};
 use crate::embedded::{Embedded, StoreLocation};
 use crate::environment::Unused;
 use crate::exit_status::{CommandFailure, ExitStatus, Interruption, stdout_failure};
-use crate::output::{self, ShownResult};
-use crate::progress::{Progress, say};
+use crate::output::{self, Detail, ShownResult};
+use crate::progress::{Progress, ShownProgress, say};
 use crate::request_id::RequestId;
 use crate::resolved::{Run, RunLocation};
 use crate::results_directory::ResultsDirectory;
@@ -28,8 +28,8 @@ use crate::{cost, report_directory, result_status, unsearched_groups, warnings};
 
 /// Runs the job, or shows the result of an earlier run.
 pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, CommandFailure> {
-    let noted =
-        job_file::read_with_warnings(&run.job, run.kind).map_err(CommandFailure::bad_input)?;
+    let input = run.job.open().map_err(CommandFailure::bad_input)?;
+    let noted = job_file::of_input(&input, run.kind).map_err(CommandFailure::bad_input)?;
     let specification = &noted.specification;
     if let Some(result) = finished(&run, specification)? {
         return show(&run, specification, &result);
@@ -37,12 +37,17 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
     if let Some(reason) = failed_before(&run, specification)? {
         say(&format!("the last run in this directory failed and is started again: {reason}"));
     }
-    if let RunLocation::Coordinator(remote) = &run.location {
+    let is_quiet = run.verbosity.quiet;
+    if let RunLocation::Coordinator(remote) = &run.location
+        && !is_quiet
+    {
         remote.announce();
     }
-    unsearched_groups::warn(&run.job, &noted);
+    unsearched_groups::warn(input.path(), &noted);
     warnings::say_of_job(specification, &noted.warnings).await;
-    if let (RunLocation::Local { workers, threads }, Some(isa)) = (&run.location, isa) {
+    if let (RunLocation::Local { workers, threads }, Some(isa), false) =
+        (&run.location, isa, is_quiet)
+    {
         let threads = workers.saturating_mul(*threads);
         cost::say_if_remarkable(specification, isa, threads).await;
     }
@@ -60,7 +65,8 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
     if let Some(result) = finished(&run, specification)? {
         return show(&run, specification, &result);
     }
-    let job = NamedJob { specification, name: &run.name, progress: run.progress };
+    let shown = ShownProgress { format: run.progress, verbosity: run.verbosity };
+    let job = NamedJob { specification, name: &run.name, progress: shown };
     let fetched = match location {
         ConnectedLocation::Local { workers, threads } => {
             run_locally(workers, threads, job, directory.as_ref(), interruption).await?
@@ -78,7 +84,7 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
 struct NamedJob<'a> {
     specification: &'a JobSpecification,
     name: &'a str,
-    progress: ProgressFormat,
+    progress: ShownProgress,
 }
 
 /// Where a job is computed; a coordinator is already connected.
@@ -150,7 +156,12 @@ fn show(
     specification: &JobSpecification,
     result: &ResultFile,
 ) -> Result<ExitStatus, CommandFailure> {
-    let shown = ShownResult { specification, result, directory: run.out.as_deref() };
+    let detail = match run.verbosity {
+        VerbosityArguments { quiet: true, .. } => Detail::Summary,
+        VerbosityArguments { verbose: true, .. } => Detail::Full,
+        VerbosityArguments { .. } => Detail::Usual,
+    };
+    let shown = ShownResult { specification, result, directory: run.out.as_deref(), detail };
     output::stdout(run.format).result(&shown).map_err(stdout_failure)?;
     if let Some(directory) = run.out.as_deref().filter(|_| run.report) {
         report_directory::write_beside(directory)?;

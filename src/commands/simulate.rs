@@ -24,7 +24,8 @@ pub(super) async fn simulate(
     isa: Isa,
 ) -> Result<ExitStatus, CommandFailure> {
     let format = resolved::format(arguments.json);
-    let case = case_file::read(&arguments.case).map_err(CommandFailure::bad_input)?;
+    let input = arguments.case.open().map_err(CommandFailure::bad_input)?;
+    let case = case_file::of_input(&input).map_err(CommandFailure::bad_input)?;
     warnings::say_all(&case_warnings(&case));
     let traces = arguments.out.as_ref().map(|directory| directory.join(TRACES));
     let setup = case.setup;

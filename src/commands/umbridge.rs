@@ -6,9 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-use anyhow::anyhow;
 use osteon_common::job::JobKind;
-use osteon_common::visible;
 use osteon_files::job_file::{self, FilePurpose};
 use osteon_proto::credentials::CredentialFiles;
 
@@ -29,16 +27,12 @@ const KEPT: Duration = Duration::from_secs(60);
 /// Serves until SIGINT or SIGTERM, or until the workers cannot continue. The URL is printed.
 pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFailure> {
     let ModelService { job, address, location, isa } = service;
-    let kind = match job_file::purpose(&job).map_err(CommandFailure::bad_input)? {
+    let input = job.open().map_err(CommandFailure::bad_input)?;
+    let kind = match job_file::purpose(&input).map_err(CommandFailure::bad_input)? {
         FilePurpose::Job(kind) => kind,
-        FilePurpose::Case => {
-            return Err(CommandFailure::bad_input(anyhow!(
-                "{} is a case file, which describes one bone, and no job",
-                visible::path(&job)
-            )));
-        }
+        FilePurpose::Case => JobKind::Propagation,
     };
-    let noted = job_file::read_with_warnings(&job, kind).map_err(CommandFailure::bad_input)?;
+    let noted = job_file::of_input(&input, kind).map_err(CommandFailure::bad_input)?;
     warnings::say_of_job(&noted.specification, &noted.warnings).await;
     if kind == JobKind::Propagation {
         say("the job has no [data]: there is no model \"posterior\"");

@@ -20,6 +20,7 @@ use osteon_solver::{FirstSignal, GuidedWave, GuidedWaves};
 use serde_json::{Value, json};
 
 use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation, solver_of};
+use crate::doctor::{self, Diagnosis};
 use crate::output::text::operators::worker_state_name;
 use crate::output::text::{kind_name, state_name, status_name};
 use crate::output::times::utc;
@@ -80,6 +81,21 @@ impl Output for JsonOutput<'_> {
 
     fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()> {
         self.value(&worker_value(worker))
+    }
+
+    fn diagnoses(&mut self, diagnoses: &[Diagnosis]) -> io::Result<()> {
+        let check = |diagnosis: &Diagnosis| {
+            json!({
+                "check": diagnosis.check,
+                "status": diagnosis.verdict.name(),
+                "found": diagnosis.found,
+                "advice": diagnosis.advice,
+            })
+        };
+        self.value(&json!({
+            "status": doctor::worst(diagnoses).name(),
+            "checks": diagnoses.iter().map(check).collect::<Vec<_>>(),
+        }))
     }
 
     fn health(&mut self, not_serving: Option<&str>) -> io::Result<()> {

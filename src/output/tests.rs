@@ -77,7 +77,12 @@ fn shown(kind: JobKind, free: &[&str], json: &str) -> String {
         JobKind::Identification => identification(json),
         JobKind::Propagation => propagation(json),
     };
-    let shown = ShownResult { specification: &specification, result: &result, directory };
+    let shown = ShownResult {
+        specification: &specification,
+        result: &result,
+        directory,
+        detail: Detail::Usual,
+    };
     printed(OutputFormat::Text, |output| output.result(&shown).unwrap())
 }
 
@@ -109,7 +114,12 @@ fn a_search_for_the_nearest_point_says_so() {
     specification.search = Search { cost_tolerance: 1e-10, ..Search::by(SearchMethod::Newton) };
     let shown = |json: &str| {
         let result = &identification(json);
-        let shown = ShownResult { specification: &specification, result, directory: None };
+        let shown = ShownResult {
+            specification: &specification,
+            result,
+            directory: None,
+            detail: Detail::Usual,
+        };
         printed(OutputFormat::Text, |output| output.result(&shown).unwrap())
     };
     let nearest = "this is the one nearest to the start";
@@ -136,7 +146,12 @@ fn a_likelihood_is_shown_with_its_error_and_what_the_data_say() {
     let mut specification = specification(JobKind::Identification, &free);
     specification.objective = Objective::Likelihood;
     let result = &identification(&detailed());
-    let shown = ShownResult { specification: &specification, result, directory: None };
+    let shown = ShownResult {
+        specification: &specification,
+        result,
+        directory: None,
+        detail: Detail::Usual,
+    };
     insta::assert_snapshot!(printed(OutputFormat::Text, |output| output.result(&shown).unwrap()));
 }
 
@@ -354,6 +369,11 @@ fn json_is_what_stands_in_the_file() {
     let specification = specification(JobKind::Identification, &["dispersion"]);
     let file = include_str!("../../fuzz/corpus/results/identification.json");
     let result = &identification(file);
-    let shown = ShownResult { specification: &specification, result, directory: None };
+    let shown = ShownResult {
+        specification: &specification,
+        result,
+        directory: None,
+        detail: Detail::Usual,
+    };
     assert_eq!(printed(OutputFormat::Json, |output| output.result(&shown).unwrap()), file);
 }

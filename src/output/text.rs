@@ -3,6 +3,7 @@
 mod check;
 mod cost;
 mod data_notes;
+mod details;
 mod fit;
 mod groups;
 mod identified;
@@ -28,6 +29,7 @@ use self::layout::{WIDTH, aligned, glued};
 use self::number::significant;
 use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation};
 use crate::client;
+use crate::doctor::Diagnosis;
 use crate::progress::{JobProgress, line, span};
 
 pub(crate) use self::layout::wrapped;
@@ -87,6 +89,17 @@ impl Output for TextOutput<'_> {
 
     fn worker(&mut self, worker: &WorkerSnapshot) -> io::Result<()> {
         self.verbatim(&operators::attached(std::slice::from_ref(worker)))
+    }
+
+    fn diagnoses(&mut self, diagnoses: &[Diagnosis]) -> io::Result<()> {
+        let rows = diagnoses.iter().flat_map(|diagnosis| {
+            let Diagnosis { check, verdict, found, advice } = diagnosis;
+            let row =
+                |first: &str, second: &str, third: &str| [first, second, third].map(str::to_owned);
+            let advice = advice.as_ref().map(|advice| row("", "", advice));
+            std::iter::once(row(verdict.name(), check, found)).chain(advice)
+        });
+        self.verbatim(&aligned(&rows.collect::<Vec<_>>()))
     }
 
     fn health(&mut self, not_serving: Option<&str>) -> io::Result<()> {

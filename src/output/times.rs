@@ -6,7 +6,7 @@ use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
 /// Returns a time since the Unix epoch in UTC by RFC 3339, to the second: `2026-01-31T09:30:00Z`.
-pub(super) fn utc(since_epoch: Duration) -> Option<String> {
+pub(crate) fn utc(since_epoch: Duration) -> Option<String> {
     let seconds = i64::try_from(since_epoch.as_secs()).ok()?;
     OffsetDateTime::from_unix_timestamp(seconds).ok()?.format(&Rfc3339).ok()
 }

@@ -1,13 +1,12 @@
 //! `umbridge`, with environment and defaults resolved.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
 
 use anyhow::anyhow;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_solver::Isa;
 
-use crate::arguments::UmbridgeArguments;
+use crate::arguments::{JobFileArguments, UmbridgeArguments};
 use crate::environment::Environment;
 use crate::exit_status::CommandFailure;
 
@@ -22,7 +21,7 @@ const PORT_VARIABLE: &str = "PORT";
 #[derive(Debug)]
 pub(crate) struct ModelService {
     /// The job file.
-    pub(crate) job: PathBuf,
+    pub(crate) job: JobFileArguments,
     /// Address to listen on.
     pub(crate) address: SocketAddr,
     /// Where points are evaluated.

@@ -6,6 +6,7 @@ mod deny;
 mod deploy;
 mod digests;
 mod fleet;
+mod manual;
 mod metrics;
 mod peers;
 mod python;
@@ -121,6 +122,11 @@ const TASKS: &[(&str, &str, Action)] = &[
         "metrics",
         "metrics, dashboard and alert rules: their tests, and promtool if there is one",
         Action::Function(metrics::check),
+    ),
+    (
+        "man",
+        "builds the release and writes its manual pages and shell completions beside it, for packages",
+        Action::Function(manual::write),
     ),
     (
         "deploy",

@@ -48,8 +48,10 @@ fn bounds(
         return;
     }
     if lower >= upper {
+        let reversed = lower > upper;
         let [lower, upper] = [lower, upper].map(written);
-        let message = format!("the lower bound {lower} must be below the upper {upper}");
+        let cure = if reversed { format!("; write [{upper}, {lower}]") } else { String::new() };
+        let message = format!("the lower bound {lower} must be below the upper {upper}{cure}");
         violations.add(path, message);
     } else if let Some(question) = kind.question(&[lower, upper], accepted) {
         let asked_for = kind.asked_for();

@@ -9,6 +9,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 
 use super::budget::Budget;
 use super::node::{Format, Node, SyntaxError, Value};
+use crate::excerpt::Excerpt;
 
 /// Parses a JSON text.
 pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {
@@ -19,13 +20,20 @@ pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {
         let (line, column) = (error.line(), error.column());
         let message = error.to_string();
         let suffix = format!(" at line {line} column {column}");
+        let start = offset(text, line, column);
         SyntaxError {
             format: Format::Json,
-            line: line.max(1),
-            column: column.max(1),
+            excerpt: Box::new(Excerpt::new(text, start..start + 1)),
             message: message.strip_suffix(&suffix).unwrap_or(&message).to_owned(),
+            help: None,
         }
     })
+}
+
+/// Returns the byte offset of a line and a column in bytes, both from 1.
+fn offset(text: &str, line: usize, column: usize) -> usize {
+    let lines = text.split_inclusive('\n').take(line.saturating_sub(1));
+    lines.map(str::len).sum::<usize>() + column.saturating_sub(1)
 }
 
 /// Builds the tree of a JSON text within a budget.

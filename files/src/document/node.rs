@@ -8,6 +8,8 @@ use osteon_common::field_path::{quoted, shown_key};
 use osteon_common::visible;
 use thiserror::Error;
 
+use crate::excerpt::Excerpt;
+
 /// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -42,16 +44,25 @@ impl Format {
 
 /// A syntax error in the text of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("line {line}, column {column}: not valid {}: {}", .format.name(), visible::line(message))]
+#[error("line {}, column {}: {}", .excerpt.line, .excerpt.column, self.cause())]
 pub struct SyntaxError {
     /// The expected format.
     pub format: Format,
-    /// Line, from 1.
-    pub line: usize,
-    /// Column in characters, from 1.
-    pub column: usize,
+    /// The place.
+    pub excerpt: Box<Excerpt>,
     /// The parser's message.
     pub message: String,
+    /// What to write instead, if that can be guessed.
+    pub help: Option<String>,
+}
+
+impl SyntaxError {
+    /// Returns the message without the place.
+    pub(crate) fn cause(&self) -> String {
+        let help = self.help.as_ref().map(|help| format!("; {help}")).unwrap_or_default();
+        let (format, message) = (self.format.name(), visible::line(&self.message));
+        format!("not valid {format}: {message}{}", visible::line(&help))
+    }
 }
 
 /// A value with its line number (for a table's entry: the line of its key).
@@ -86,6 +97,14 @@ pub(crate) enum Value {
 }
 
 impl Node {
+    /// Returns whether this is a table with this key.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        match &self.value {
+            Value::Table(entries) => entries.iter().any(|(name, _)| name == key),
+            _ => false,
+        }
+    }
+
     /// Returns the line of the field with this path. If the field is absent, returns the line of the
     /// innermost existing table on the path; `None` if that table has no header line of its own.
     ///
@@ -147,11 +166,4 @@ impl fmt::Display for Value {
             Self::Table(_) => f.write_str("a table"),
         }
     }
-}
-
-/// Returns line and column, both from 1, of a byte offset.
-pub(crate) fn position(text: &str, offset: usize) -> (usize, usize) {
-    let before = text.get(..offset).unwrap_or(text);
-    let line_start = before.rfind('\n').map_or(0, |at| at + 1);
-    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
 }

@@ -1,21 +1,25 @@
 //! Parses TOML text into a tree, with the line of every key and element.
 
+mod cures;
 mod size_limits;
+mod spans;
 
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
-use super::node::{Format, Node, SyntaxError, Value, position};
+use super::node::{Format, Node, SyntaxError, Value};
+use crate::excerpt::Excerpt;
+
+pub(crate) use spans::FieldSpans;
 
 /// Parses a TOML text.
 pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {
     if let Err((offset, exceeded)) = size_limits::check(text) {
-        let (line, column) = position(text, offset);
         return Err(SyntaxError {
             format: Format::Toml,
-            line,
-            column,
+            excerpt: Box::new(Excerpt::new(text, offset..offset + 1)),
             message: exceeded.to_string(),
+            help: None,
         });
     }
     let table = DeTable::parse(text).map_err(|error| syntax_error(text, &error))?;
@@ -24,12 +28,12 @@ pub(super) fn parse(text: &str) -> Result<Node, SyntaxError> {
 }
 
 fn syntax_error(text: &str, error: &toml::de::Error) -> SyntaxError {
-    let (line, column) = position(text, error.span().map_or(0, |span| span.start));
+    let span = error.span().unwrap_or(0..1);
     SyntaxError {
         format: Format::Toml,
-        line,
-        column,
+        excerpt: Box::new(Excerpt::new(text, span.clone())),
         message: error.message().trim_end().replace('\n', "; "),
+        help: cures::cure(text, span.start, error.message()),
     }
 }
 

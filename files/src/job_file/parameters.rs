@@ -136,7 +136,11 @@ fn bounds(reader: &mut Reader, table: &Table<'_>) -> Option<[f64; 2]> {
     let bounds = <[f64; 2]>::try_from(numbers).ok();
     if bounds.is_none() {
         let found = &table.get("bounds")?.value;
-        reader.violations.add(path, format!("is {found}; it must be {expected}"));
+        let cure = match elements.len() {
+            3 | 4 => "; numbers have a decimal point, not a comma",
+            _ => "",
+        };
+        reader.violations.add(path, format!("is {found}; it must be {expected}{cure}"));
     }
     bounds
 }

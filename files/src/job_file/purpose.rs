@@ -1,12 +1,10 @@
 //! Tells case files from job files by their sections, before they are read.
 
-use std::path::Path;
-
 use osteon_common::job::JobKind;
 
-use super::BOUND;
-use crate::document::{self, Value};
-use crate::file_error::{self, FileError};
+use crate::document::Node;
+use crate::file_error::FileError;
+use crate::input_file::InputFile;
 
 /// The kind of a file, as its sections show it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,21 +15,24 @@ pub enum FilePurpose {
     Case,
 }
 
-/// Returns what the file at `path` describes. Nothing else in it is checked.
+/// Returns what a file describes. Nothing else in it is checked.
 ///
 /// # Errors
-/// If the file cannot be read, or is malformed.
-pub fn purpose(path: &Path) -> Result<FilePurpose, FileError> {
-    let (text, format) = file_error::read(path, BOUND)?;
-    let root = document::parse(file_error::without_byte_order_mark(&text), format)
-        .map_err(|error| FileError::Content { path: path.to_owned(), content: error.into() })?;
-    let has = |key: &str| match &root.value {
-        Value::Table(entries) => entries.iter().any(|(name, _)| name == key),
-        _ => false,
-    };
-    Ok(match (has("data"), has("bone") && !has("parameters")) {
+/// If the file is malformed.
+pub fn purpose(input: &InputFile) -> Result<FilePurpose, FileError> {
+    match input.document().tree() {
+        Ok(root) => Ok(of_tree(&root)),
+        Err(error) => {
+            Err(FileError::Content { path: input.path().to_owned(), content: error.into() })
+        }
+    }
+}
+
+/// Returns what the tree of a file describes.
+pub(super) fn of_tree(root: &Node) -> FilePurpose {
+    match (root.has("data"), root.has("bone") && !root.has("parameters")) {
         (_, true) => FilePurpose::Case,
         (true, false) => FilePurpose::Job(JobKind::Identification),
         (false, false) => FilePurpose::Job(JobKind::Propagation),
-    })
+    }
 }

@@ -9,7 +9,7 @@ use encoding_rs_io::DecodeReaderBytesBuilder;
 use osteon_common::limits;
 
 use super::problem::{LocatedProblem, Problem};
-use crate::file_error::without_byte_order_mark;
+use crate::document_text::without_byte_order_mark;
 use crate::user_file;
 
 /// Opens a file as UTF-8 text, whatever its encoding is: that of its byte order mark, or else the

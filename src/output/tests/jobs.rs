@@ -125,6 +125,7 @@ fn what_others_say_is_shown_without_hidden_characters() {
         specification: &specification,
         result: &identification(&json),
         directory: Some(directory),
+        detail: Detail::Usual,
     };
     let print = |format: OutputFormat| {
         printed(format, |output| {

@@ -1,6 +1,7 @@
 //! The table of a result. A stored result looks the same as one that was just computed.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use osteon_common::job::{JobSpecification, Objective, Range};
 use osteon_common::outcome::FailureKind;
@@ -12,13 +13,18 @@ use osteon_search::search_box::SearchBox;
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};
-use super::{data_notes, fit, groups, identified, posterior, solver};
-use crate::output::ShownResult;
+use super::{data_notes, details, fit, groups, identified, posterior, solver};
+use crate::output::{Detail, ShownResult};
 use crate::result_status;
 
 /// Returns the table.
 pub(super) fn table(shown: &ShownResult<'_>) -> String {
     let mut text = String::new();
+    if shown.detail == Detail::Summary {
+        text.push_str(&summary(shown));
+        text.push_str(&files(shown));
+        return text;
+    }
     let solver = match shown.result {
         ResultFile::Identification(found) => {
             identification(&mut text, found, shown.specification);
@@ -29,12 +35,42 @@ pub(super) fn table(shown: &ShownResult<'_>) -> String {
             &found.solver
         }
     };
+    if shown.detail == Detail::Full {
+        text.push_str(&details::text(shown.result));
+    }
     text.push_str(&format!("\n{}", wrapped(&solver::line(solver))));
     text.push_str(&format!("\ndigest {}\n", visible::line(shown.result.digest())));
-    if let Some(directory) = shown.directory {
-        text.push_str(&wrapped(&format!("files in {}", visible::path(directory))));
-    }
+    text.push_str(&files(shown));
     text
+}
+
+/// Returns the line that names the directory of the files, if there is one.
+fn files(shown: &ShownResult<'_>) -> String {
+    let line = |directory: &Path| wrapped(&format!("files in {}", visible::path(directory)));
+    shown.directory.map(line).unwrap_or_default()
+}
+
+/// Returns how the run ended, and its numbers without remarks.
+fn summary(shown: &ShownResult<'_>) -> String {
+    let specification = shown.specification;
+    match shown.result {
+        ResultFile::Identification(found) => {
+            let headline = headline(found, specification);
+            if let Some(groups) = &found.groups {
+                return format!("{headline}{}", groups::table(groups, found.control_variate));
+            }
+            let point = found.cost.and_then(|_| found.parameters.point(found.dispersion));
+            let Some(point) = point else { return headline };
+            let parameters = parameters(found, &point, specification);
+            format!("{headline}\n{}\n{parameters}", moments_and_cost(found))
+        }
+        ResultFile::Propagation(found) => {
+            let failure = result_status::propagation_failure(specification, found);
+            let failure = failure.map(|reason| wrapped(&format!("Failed: {reason}")));
+            let moments = aligned(&moments(&found.velocity, None));
+            format!("{}{moments}", failure.unwrap_or_default())
+        }
+    }
 }
 
 fn identification(text: &mut String, found: &Identification, specification: &JobSpecification) {
