@@ -43,6 +43,9 @@ const standing = (job) => {
 const put = (node, text) => {
   if (node.textContent !== text) node.textContent = text;
 };
+const attribute = (node, name, value) => {
+  if (node.getAttribute(name) !== value) node.setAttribute(name, value);
+};
 const element = (name, className, text) => {
   const made = document.createElement(name);
   if (className) made.className = className;
@@ -127,7 +130,7 @@ const showAlerts = ({ jobs: all, workers, store, mismatches }) => {
     item.append(element("span", "mark", name), element("span"));
     return item;
   }, (item, [kind, , text]) => {
-    if (item.className !== kind) item.className = kind;
+    attribute(item, "class", kind);
     put(item.lastChild, text);
   });
 };
@@ -196,22 +199,24 @@ const jobRow = (job) => {
 
 const fillJobRow = (row, job) => {
   const [name, state, progress, time, client, priority] = row.cells;
-  const current = job.job === shown.job ? "true" : "false";
-  if (row.getAttribute("aria-current") !== current) row.setAttribute("aria-current", current);
+  attribute(row, "data-state", job.state);
+  attribute(row, "aria-current", job.job === shown.job ? "true" : "false");
   put(name.firstChild, title(job));
   put(name.lastChild, job.name === "" ? "" : `job ${job.job}`);
   const [text, kind] = standing(job);
   put(state.firstChild, text);
-  if (state.firstChild.className !== `state ${kind}`) state.firstChild.className = `state ${kind}`;
+  attribute(state.firstChild, "class", `state ${kind}`);
   put(state.lastChild, job.waiting_for === "" ? "" : `waits for ${job.waiting_for}`);
   const single = job.kind === "propagation";
   const [done, all] = single ? [job.realizations_done, job.realizations] : [job.evaluations, job.max_evaluations];
   const bar = progress.firstChild.firstChild;
-  if (bar.max !== all) bar.max = all;
-  if (bar.value !== done) bar.value = done;
-  bar.setAttribute("aria-label", `${single ? "realizations" : "evaluations"} of ${title(job)}`);
-  put(progress.firstChild.lastChild, `${whole(done)} of at most ${whole(all)}`.replace(single ? "at most " : "", ""));
-  put(progress.lastChild, single ? "realizations" : job.state === "running" ? `evaluations; ${whole(job.realizations_done)} of ${whole(job.realizations)} realizations` : "evaluations");
+  // Attributes, because a bar without one of them is shown as that of a work without a known end.
+  attribute(bar, "max", String(all));
+  attribute(bar, "value", String(done));
+  attribute(bar, "aria-label", `${single ? "realizations" : "evaluations"} of ${title(job)}`);
+  put(progress.firstChild.lastChild, `${whole(done)} of ${whole(all)}`);
+  const under = job.state === "running" ? `, now ${whole(job.realizations_done)} of ${whole(job.realizations)} realizations` : "";
+  put(progress.lastChild, single ? "realizations" : `evaluations at most${under}`);
   put(time, span(job.elapsed_s));
   put(client, job.client);
   put(priority, String(job.priority));
