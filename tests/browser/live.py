@@ -8,11 +8,14 @@ is asked, and the page takes less than a fifth of the browser's main thread.
 """
 
 import concurrent.futures
+import http.client
+import http.server
 import json
 import shutil
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import looking
@@ -93,19 +96,53 @@ def free_address():
         return f"127.0.0.1:{probe.getsockname()[1]}"
 
 
+class Proxy(http.server.BaseHTTPRequestHandler):
+    """A proxy that serves a page below a path, and passes events on as they come."""
+
+    protocol_version = "HTTP/1.1"
+    path_prefix, behind = "/lab/osteon", None
+
+    def do_GET(self):
+        if not self.path.startswith(f"{self.path_prefix}/"):
+            return self.send_error(404)
+        upstream = http.client.HTTPConnection(self.behind, timeout=PATIENCE)
+        headers = {name: value for name, value in self.headers.items() if name.lower() != "connection"}
+        upstream.request(self.command, self.path.removeprefix(self.path_prefix), headers=headers)
+        answer = upstream.getresponse()
+        self.send_response(answer.status)
+        for name, value in answer.getheaders():
+            if name.lower() not in ("connection", "transfer-encoding", "content-length", "date"):
+                self.send_header(name, value)
+        self.send_header("connection", "close")
+        self.end_headers()
+        self.close_connection = True
+        try:
+            while part := answer.read1(65536):
+                self.wfile.write(part)
+                self.wfile.flush()
+        except OSError:
+            # The browser has left the page.
+            pass
+        upstream.close()
+
+    do_POST = do_GET
+
+    def log_message(self, *_):
+        pass
+
+
 class Reader:
     """Somebody at a page, and everything that goes wrong on it."""
 
-    def __init__(self, browser, address, width=1280, scheme="light"):
+    def __init__(self, browser, address, width=1280, scheme="light", path="/"):
         self.context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
         self.page, self.problems, self.may_fail = self.context.new_page(), [], False
         self.page.set_default_timeout(PATIENCE * 1000)
         self.page.on("console", self.console)
         self.page.on("pageerror", lambda error: self.problems.append(f"script: {error}"))
-        self.page.on("request", lambda request: request.url.startswith(f"http://{address}/")
+        self.page.on("request", lambda request: request.url.startswith(f"http://{address}{path}")
                      or self.problems.append(f"request: {request.url}"))
-        self.address = address
-        self.page.goto(f"http://{address}/")
+        self.page.goto(f"http://{address}{path}")
 
     def console(self, message):
         # The browser itself reports requests that are not answered, or refused.
@@ -190,6 +227,23 @@ def use(browser, coordinator, axe):
     return reader.ended()
 
 
+def through_a_proxy(browser, coordinator):
+    """Opens the page below a path of a proxy, and cancels a job there."""
+    job = coordinator.submit("behind a proxy", 1000, 300)
+    served = http.server.ThreadingHTTPServer(("127.0.0.1", 0), type("", (Proxy,), {"behind": coordinator.http}))
+    threading.Thread(target=served.serve_forever, daemon=True).start()
+    try:
+        reader = Reader(browser, f"127.0.0.1:{served.server_port}", path=f"{Proxy.path_prefix}/")
+        reader.is_live()
+        reader.page.locator(f"#jobs a[href='#job={job}']").press("Enter")
+        reader.page.locator("#cancel").press("Enter")
+        reader.page.get_by_role("button", name="Cancel the job").press("Enter")
+        reader.page.locator("#facts", has_text="cancelled").wait_for()
+        return reader.ended()
+    finally:
+        served.shutdown()
+
+
 def grows(page):
     """Waits until the first figure is another one. Functions of Playwright that wait need what the page forbids."""
     drawn = lambda: page.locator("#figures svg").first.evaluate("svg => svg.outerHTML")
@@ -267,6 +321,7 @@ def check(arguments):
             browser = playwright.chromium.launch(executable_path=arguments.chromium, args=["--no-sandbox"])
             found = see(browser, coordinator, job, axe, work)
             for name, problems in (("use", use(browser, coordinator, axe)),
+                                   ("proxy", through_a_proxy(browser, coordinator)),
                                    ("token", give_token(browser, arguments.osteon, work, axe))):
                 print("live page", name, "; ".join(problems) or "ok")
                 found += problems

@@ -12,17 +12,11 @@ use tonic::Status;
 
 use crate::core::distribution::TimeDistribution;
 use crate::live::json;
-use crate::live::source::PageSource;
+use crate::live::source::{Overview, PageSource};
 
 /// Age from which on an overview is made again: a little less than the interval of the pages' updates,
 /// so that none gets the same one twice.
 const AGE_MAX: Duration = Duration::from_millis(900);
-
-/// An overview at one moment.
-pub(crate) struct Overview {
-    made: Instant,
-    text: Arc<str>,
-}
 
 /// Returns the newest overview, as JSON.
 pub(crate) async fn newest(source: &PageSource) -> Result<Arc<str>, Status> {

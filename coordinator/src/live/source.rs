@@ -11,7 +11,7 @@ use osteon_proto::v1::{
     ListWorkersResponse,
 };
 use tokio::sync::{Mutex, OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
-use tokio::time::timeout;
+use tokio::time::{Instant, timeout};
 use tonic::{Request, Status};
 
 use crate::access::HolderName;
@@ -19,7 +19,6 @@ use crate::access::limiter::{Caller, Limiter};
 use crate::core::effect::Answer;
 use crate::core::event;
 use crate::core::ids::JobId;
-use crate::live::overview::Overview;
 use crate::live::query::Shown;
 use crate::metrics::write_times::WriteTimes;
 use crate::service::core_task::Message;
@@ -44,6 +43,13 @@ pub(crate) struct PageSource {
     pub(crate) newest: Mutex<Option<Overview>>,
     streams: Arc<Semaphore>,
     readings: Limiter,
+}
+
+/// An overview at one moment.
+pub(crate) struct Overview {
+    pub(crate) made: Instant,
+    /// Its JSON.
+    pub(crate) text: Arc<str>,
 }
 
 impl PageSource {
