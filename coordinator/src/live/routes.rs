@@ -28,7 +28,7 @@ use crate::live::source::PageSource;
 /// Tells proxies to pass events on as they come.
 const X_ACCEL_BUFFERING: HeaderName = HeaderName::from_static("x-accel-buffering");
 
-type Source = State<Arc<PageSource>>;
+type SharedSource = State<Arc<PageSource>>;
 
 /// Returns the paths of the page, behind its gate.
 pub(crate) fn router(source: Arc<PageSource>, gate: Gate) -> Router {
@@ -49,13 +49,13 @@ pub(crate) fn router(source: Arc<PageSource>, gate: Gate) -> Router {
         .layer(from_fn_with_state(gate, gate::guard))
 }
 
-async fn overview_data(State(source): Source) -> Response {
+async fn overview_data(State(source): SharedSource) -> Response {
     answered(overview::newest(&source).await.and_then(|text| {
         serde_json::from_str(&text).map_err(|error| Status::internal(error.to_string()))
     }))
 }
 
-async fn jobs(State(source): Source, RawQuery(query): RawQuery) -> Response {
+async fn jobs(State(source): SharedSource, RawQuery(query): RawQuery) -> Response {
     let shown = match Shown::parse(query.as_deref().unwrap_or_default()) {
         Ok(shown) => shown,
         Err(error) => return json::error(StatusCode::BAD_REQUEST, &error),
@@ -65,12 +65,12 @@ async fn jobs(State(source): Source, RawQuery(query): RawQuery) -> Response {
     }))
 }
 
-async fn job(State(source): Source, Path(job): Path<String>) -> Response {
+async fn job(State(source): SharedSource, Path(job): Path<String>) -> Response {
     let Some(id) = JobId::parse(&job) else { return no_job(&job) };
     answered(events::detail(&source, id).await)
 }
 
-async fn figures(State(source): Source, Path(job): Path<String>, request: Request) -> Response {
+async fn figures(State(source): SharedSource, Path(job): Path<String>, request: Request) -> Response {
     let Some(id) = JobId::parse(&job) else { return no_job(&job) };
     let reader = Caller::from_extensions(request.extensions());
     let mut search = FollowedSearch::new(id, None);
@@ -78,7 +78,7 @@ async fn figures(State(source): Source, Path(job): Path<String>, request: Reques
 }
 
 async fn cancel(
-    State(source): Source,
+    State(source): SharedSource,
     Path(job): Path<String>,
     holder: Option<Extension<HolderName>>,
 ) -> Response {
@@ -88,7 +88,7 @@ async fn cancel(
 }
 
 async fn stream(
-    State(source): Source,
+    State(source): SharedSource,
     Extension(caller): Extension<PageCaller>,
     RawQuery(query): RawQuery,
     request: Request,
