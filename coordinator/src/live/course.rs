@@ -21,6 +21,8 @@ use crate::store::job_output::ReadRequest;
 
 /// Maximum number of rows that are read at a time: what the core copies for one update.
 const ROWS_MAX: usize = 2048;
+/// Maximum number of such readings for one update; a longer history comes with the next ones.
+const READINGS_MAX: usize = 8;
 /// Maximum number of groups that are named.
 const GROUPS_MAX: usize = 200;
 
@@ -34,6 +36,8 @@ pub(crate) struct FollowedSearch {
     is_over: bool,
     /// Figures, as they were last made.
     figures: Value,
+    /// There is something that they do not show.
+    is_stale: bool,
 }
 
 /// What was seen of a search.
@@ -51,7 +55,7 @@ struct SeenRows {
 
 impl FollowedSearch {
     pub(crate) fn new(job: JobId, wanted: Option<usize>) -> Self {
-        Self { job, wanted, seen: None, is_over: false, figures: Value::Null }
+        Self { job, wanted, seen: None, is_over: false, figures: Value::Null, is_stale: false }
     }
 
     /// Returns whether it follows this group of this job.
@@ -59,7 +63,8 @@ impl FollowedSearch {
         (self.job, self.wanted) == (job, wanted)
     }
 
-    /// Returns the figures as of now.
+    /// Returns the figures as of now. A search that was begun again, after the ban of a worker, is read
+    /// again.
     ///
     /// # Errors
     /// When the coordinator or its store does not answer.
@@ -68,31 +73,33 @@ impl FollowedSearch {
         source: &PageSource,
         caller: Caller,
     ) -> Result<&Value, Status> {
-        if !self.is_over && self.read(source, caller).await? {
+        for _ in 0..READINGS_MAX {
+            if self.is_over || !self.read(source, caller.clone()).await? {
+                break;
+            }
+        }
+        if std::mem::take(&mut self.is_stale) {
             self.draw();
         }
         Ok(&self.figures)
     }
 
-    /// Reads what is new; returns whether anything is.
+    /// Reads what is new; returns whether there may be more.
     async fn read(&mut self, source: &PageSource, caller: Caller) -> Result<bool, Status> {
         let seen = self.seen.as_ref();
         // The last row is read once more: if it has changed, the search was begun again.
         let from = seen.map_or(0, |seen| seen.count.saturating_sub(1));
         let request = Request::Follow { job: self.job, from, limit: ROWS_MAX };
-        let new = match source.ask(request).await? {
+        let (is_other_set, is_full) = match source.ask(request).await? {
             Answer::Followed(SearchRows { specification, rows }) => {
                 let last = seen.and_then(|seen| seen.last.as_ref());
                 let overlap = usize::from(last.is_some());
                 if last.is_some_and(|last| !rows.first().is_some_and(|row| is_same(row, last))) {
                     self.seen = None;
-                    return Ok(false);
+                    return Ok(true);
                 }
                 let new = rows.get(overlap..).unwrap_or_default();
-                if self.seen.is_some() && new.is_empty() {
-                    return Ok(false);
-                }
-                self.add(specification, new)
+                (self.add(specification, new), rows.len() == ROWS_MAX)
             }
             Answer::Ended(_) => {
                 let _permit = source.reading(caller).await?;
@@ -102,19 +109,20 @@ impl FollowedSearch {
                 let rows = summary.await?.history;
                 self.is_over = true;
                 self.seen = None;
-                self.add(record.specification, &rows)
+                (self.add(record.specification, &rows), false)
             }
             _ => return Err(unexpected()),
         };
-        if new {
+        if is_other_set {
             self.summarize().await;
         }
-        Ok(true)
+        Ok(is_full)
     }
 
     /// Adds rows; returns whether another set of data is shown now.
     fn add(&mut self, specification: Arc<JobSpecification>, rows: &[Evaluation]) -> bool {
         let mut is_new = self.seen.is_none();
+        self.is_stale |= is_new || !rows.is_empty();
         let begun = |specification: Arc<JobSpecification>, set: usize| SeenRows {
             course: SearchCourse::of_job(&specification, set),
             specification,
@@ -184,3 +192,6 @@ fn is_same(row: &Evaluation, last: &Evaluation) -> bool {
     };
     bits(row) == bits(last)
 }
+
+#[cfg(test)]
+mod tests;

@@ -38,7 +38,8 @@ pub(crate) fn updates(
     permit: OwnedSemaphorePermit,
 ) -> impl Stream<Item = Result<String, std::convert::Infallible>> {
     let (sender, receiver) = mpsc::channel(1);
-    let mut feed = PageFeed { source, shown, caller, reader, sent: Vec::new(), search: None };
+    let mut feed =
+        PageFeed { source, shown, caller, reader, sent: SentParts::default(), search: None };
     tokio::spawn(async move {
         let _permit = permit;
         feed.run(&sender).await;
@@ -52,8 +53,7 @@ struct PageFeed {
     shown: Shown,
     caller: PageCaller,
     reader: Caller,
-    /// The newest text of each part.
-    sent: Vec<(&'static str, Arc<str>)>,
+    sent: SentParts,
     search: Option<FollowedSearch>,
 }
 
@@ -69,7 +69,7 @@ impl PageFeed {
             let Ok(parts) = self.parts().await else { return };
             let mut text = String::new();
             for (name, part) in parts {
-                text.push_str(&self.changed(name, part));
+                text.push_str(&self.sent.changed(name, part));
             }
             quiet = if text.is_empty() { quiet + 1 } else { 0 };
             if quiet >= QUIET_MAX {
@@ -123,14 +123,19 @@ impl PageFeed {
         let figures = search.figures(&self.source, self.reader.clone()).await?;
         Ok((detail, figures.to_string().into()))
     }
+}
 
+/// The newest text of each part that was sent.
+#[derive(Default)]
+struct SentParts(Vec<(&'static str, Arc<str>)>);
+
+impl SentParts {
     /// Returns the event of a part, empty if it has not changed.
     fn changed(&mut self, name: &'static str, text: Arc<str>) -> String {
-        let known = self.sent.iter_mut().find(|(known, _)| *known == name);
-        match known {
+        match self.0.iter_mut().find(|(known, _)| *known == name) {
             Some((_, known)) if *known == text => return String::new(),
             Some((_, known)) => *known = Arc::clone(&text),
-            None => self.sent.push((name, Arc::clone(&text))),
+            None => self.0.push((name, Arc::clone(&text))),
         }
         // JSON has no line breaks.
         format!("event: {name}\ndata: {text}\n\n")
@@ -143,4 +148,23 @@ pub(crate) async fn detail(source: &PageSource, job: JobId) -> Result<Value, Sta
     let mut detail = json::job(&snapshot);
     detail["explain"] = json::explanation(&explained);
     Ok(detail)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_is_sent_when_it_has_changed() {
+        let mut sent = SentParts::default();
+        for (name, text, expected) in [
+            ("jobs", "1", "event: jobs\ndata: 1\n\n"),
+            ("jobs", "1", ""),
+            ("job", "1", "event: job\ndata: 1\n\n"),
+            ("jobs", "2", "event: jobs\ndata: 2\n\n"),
+            ("job", "1", ""),
+        ] {
+            assert_eq!(sent.changed(name, text.into()), expected, "{name} {text}");
+        }
+    }
 }

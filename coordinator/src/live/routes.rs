@@ -70,7 +70,11 @@ async fn job(State(source): SharedSource, Path(job): Path<String>) -> Response {
     answered(events::detail(&source, id).await)
 }
 
-async fn figures(State(source): SharedSource, Path(job): Path<String>, request: Request) -> Response {
+async fn figures(
+    State(source): SharedSource,
+    Path(job): Path<String>,
+    request: Request,
+) -> Response {
     let Some(id) = JobId::parse(&job) else { return no_job(&job) };
     let reader = Caller::from_extensions(request.extensions());
     let mut search = FollowedSearch::new(id, None);
