@@ -2,8 +2,6 @@
 //! restarted.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
-#![expect(clippy::expect_used, reason = "a test that cannot go on should say why")]
-#![expect(clippy::panic, reason = "a test that cannot go on should say why")]
 
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
@@ -12,6 +10,10 @@ mod api;
 #[cfg(test)]
 #[path = "support/page.rs"]
 mod page;
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
+#[path = "support/peer.rs"]
+mod peer;
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
 #[path = "support/secure.rs"]
@@ -27,11 +29,14 @@ mod support;
 use std::net::TcpListener;
 
 use osteon_common::job::JobKind;
-use osteon_proto::v1::SubmitRequest;
+use osteon_proto::endpoint::{connect, workers_client};
+use osteon_proto::v1::attach_request::Message;
+use osteon_proto::v1::{AttachRequest, SubmitRequest, WorkerHello};
 use page::{Page, Updates};
 use serde_json::Value;
 use service::Service;
 use support::{DEADLINE, Owned, Scratch, eventually, job, osteon, run, text};
+use tokio_stream::wrappers::ReceiverStream;
 
 /// A coordinator with a live page.
 struct Served {
@@ -364,6 +369,40 @@ fn ten_thousand_jobs_are_shown_page_by_page() {
         }
     }
     assert_eq!(seen, count);
+}
+
+/// A thousand workers on a hundred hosts are counted host by host.
+#[test]
+fn a_thousand_workers_are_counted_by_host() {
+    // They send no heartbeats.
+    let served = Served::start(&["--lease", "600"]);
+    let url = served.service.url().to_owned();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let attached = runtime.block_on(async {
+        let (mut open, endpoint) = (Vec::new(), url.parse().unwrap());
+        for connection in 0..5 {
+            // A connection carries a limited number of streams.
+            let channel = connect(&endpoint, DEADLINE).await.unwrap();
+            for number in connection * 200..(connection + 1) * 200 {
+                let host = format!("node-{:02}", number % 100);
+                let message = Some(Message::Hello(WorkerHello { host, ..peer::hello(number) }));
+                let (sender, messages) = tokio::sync::mpsc::channel(1);
+                sender.send(AttachRequest { message }).await.unwrap();
+                let mut client = workers_client(channel.clone());
+                let stream = client.attach(ReceiverStream::new(messages)).await.unwrap();
+                open.push((sender, stream));
+            }
+        }
+        open
+    });
+    let mut updates = served.page.events("", &[]).unwrap();
+    let overview = updates.until("overview", |it| it["workers"]["count"] == 1000);
+    assert_eq!(attached.len(), 1000);
+    let workers = &overview["workers"];
+    assert_eq!(workers["hosts"].as_array().unwrap().len(), 40);
+    assert_eq!([&workers["more_hosts"], &workers["slots_idle"]], [60, 1000]);
+    assert_eq!(workers["hosts"][0]["workers"], 10);
+    assert!(overview.to_string().len() < 10_000, "{overview}");
 }
 
 #[test]
