@@ -36,8 +36,9 @@ def main(check, description):
     parser.add_argument("--work", type=pathlib.Path, required=True)
     parser.add_argument("--chromium", required=True)
     arguments = parser.parse_args()
-    # Playwright wants a path.
+    # Playwright wants whole paths.
     arguments.chromium = shutil.which(arguments.chromium) or arguments.chromium
+    arguments.osteon, arguments.work = arguments.osteon.resolve(), arguments.work.resolve()
     arguments.work.mkdir(parents=True, exist_ok=True)
     environment = arguments.work / "venv"
     if pathlib.Path(sys.prefix) == environment.resolve():
