@@ -60,6 +60,7 @@ fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
         ("osteon-coordinator", "osteon-common"),
         ("osteon-coordinator", "osteon-files"),
         ("osteon-coordinator", "osteon-proto"),
+        ("osteon-coordinator", "osteon-report"),
         ("osteon-coordinator", "osteon-search"),
         ("osteon-files", "osteon-common"),
         ("osteon-proto", "osteon-common"),

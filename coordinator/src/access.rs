@@ -154,6 +154,22 @@ pub fn need(path: &str) -> Requirement {
     }
 }
 
+/// Returns the requirement of a path of the live page: that of the method which gives or does the same.
+pub fn page_need(path: &str) -> Requirement {
+    match path {
+        // The page itself is the same for everybody, and says nothing of any job.
+        "/" | "/page.css" | "/page.js" | "/charts.js" | "/icon.svg" => Requirement::Nothing,
+        "/data/jobs" => need("/osteon.v1.Jobs/List"),
+        "/data/overview" => need("/osteon.v1.Jobs/ListWorkers"),
+        "/events" => need("/osteon.v1.Jobs/Watch"),
+        path if path.starts_with("/data/jobs/") && path.ends_with("/cancel") => {
+            need("/osteon.v1.Jobs/Cancel")
+        }
+        path if path.starts_with("/data/jobs/") => need("/osteon.v1.Jobs/Explain"),
+        _ => Requirement::Known,
+    }
+}
+
 /// Decides whether a call is admitted. Returns the name of the token's holder if a token decided
 /// it.
 ///

@@ -18,6 +18,7 @@ pub(crate) mod fairness;
 pub mod ids;
 pub mod indices;
 pub(crate) mod job;
+pub(crate) mod job_pages;
 pub(crate) mod measurements;
 pub mod notice;
 pub(crate) mod probation;

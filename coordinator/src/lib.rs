@@ -2,12 +2,14 @@
 //!
 //! The coordinator consists of a pure state machine ([`core`]) and an asynchronous shell around it
 //! ([`service`]) that only moves bytes. [`access`] decides who may call what; [`store`] holds
-//! everything that outlives the process; `metrics` says what is exported for monitoring. An [`osteon_search::Search`] decides which points a job
+//! everything that outlives the process; `metrics` says what is exported for monitoring, and [`live`] shows
+//! it to people. An [`osteon_search::Search`] decides which points a job
 //! evaluates and does not depend on workers. This crate never links the solver: only workers solve.
 
 pub mod access;
 pub mod config;
 pub mod core;
+pub mod live;
 pub(crate) mod metrics;
 pub mod service;
 pub mod store;
@@ -16,6 +18,7 @@ pub use access::Policy;
 pub use access::tls::Tls;
 pub use access::tokens::Tokens;
 pub use config::Config;
+pub use live::listener::{PageBindError, PageListener};
 pub use service::failing::ComponentFailure;
 pub use service::listen::{BindError, ListenAddress, Listener};
 pub use service::metrics_listener::{MetricsBindError, MetricsListener};

@@ -1,8 +1,8 @@
 //! The figures of a report, each with two sentences on how to read it.
 
 mod comparison;
-mod convergence;
-mod failures;
+pub(crate) mod convergence;
+pub(crate) mod failures;
 mod groups;
 mod moments;
 mod posterior;

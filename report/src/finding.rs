@@ -12,6 +12,7 @@ use osteon_files::report::{
     PosteriorReport, Propagation, Solutions, Solver, Velocity,
 };
 
+use crate::course;
 use crate::input::{JobContext, ModelOutcomes};
 use crate::sample::VelocitySample;
 
@@ -229,12 +230,12 @@ impl<'a> Finding<'a> {
 
     /// Returns the beginning of the names of its figures.
     pub(crate) fn prefix(&self) -> String {
-        self.group.map_or_else(String::new, |_| format!("group-{}-", self.set + 1))
+        course::prefix(self.group, self.set)
     }
 
     /// Returns the end of the titles of its figures.
     pub(crate) fn suffix(&self) -> String {
-        self.group.map_or_else(String::new, |name| format!(", group {name}"))
+        course::suffix(self.group)
     }
 }
 

@@ -5,9 +5,11 @@
 //! results give the same bytes: there is no time, machine or path in a report, and no order by chance.
 
 mod chart;
+mod course;
 mod figures;
 mod finding;
 mod input;
+mod live;
 mod number;
 mod page;
 mod quantity;
@@ -15,6 +17,8 @@ mod sample;
 mod table;
 mod text;
 
+pub use course::SearchCourse;
 pub use input::{JobTables, ReportedRun};
+pub use live::{LiveFigure, SCRIPT, STYLES, failure_figure, search_figures};
 pub use page::{Report, ReportText, files_of, report};
 pub use table::TableError;

@@ -18,10 +18,10 @@ use crate::page::markup::Numbers;
 use crate::sample::VelocitySample;
 use crate::text::escaped;
 
-const PAGE_STYLE: &str = include_str!("page/page.css");
+pub(crate) const PAGE_STYLE: &str = include_str!("page/page.css");
 /// The mark by which a page is known as that of a report.
 const GENERATOR: &str = "<meta name=\"generator\" content=\"osteon report\">";
-const SCRIPT: &str = include_str!("page/page.js");
+pub(crate) const SCRIPT: &str = include_str!("page/page.js");
 
 /// Most groups of a run that get figures of their own: the page stays below two megabytes.
 const DETAILED_GROUPS_MAX: usize = 4;

@@ -10,6 +10,9 @@ use osteon_proto::endpoint::Endpoint;
 
 use super::{CredentialArguments, age, seconds};
 
+/// Maximum length of the name of a host (RFC 1035).
+const HOST_NAME_BYTES_MAX: usize = 253;
+
 /// Arguments of `coordinator`.
 #[derive(Debug, Args)]
 pub(crate) struct CoordinatorArguments {
@@ -66,6 +69,15 @@ pub(crate) struct CoordinatorArguments {
     /// written to DIR/metrics-address [default: none]
     #[arg(long, value_name = "ADDR", value_parser = tcp_address)]
     pub(crate) metrics: Option<SocketAddr>,
+    /// Serve the live page at ADDR (IP:PORT; port 0 selects a free port), with the coordinator's
+    /// certificates and for the holders of its tokens. Its URL is written to DIR/http-address
+    /// [default: none]
+    #[arg(long, value_name = "ADDR", value_parser = page_address)]
+    pub(crate) http: Option<SocketAddr>,
+    /// Answer browsers that ask for the live page by this name, too, e.g. that of a proxy. Only
+    /// needed without tokens; can be repeated
+    #[arg(long, value_name = "NAME", requires = "http", value_parser = host_name)]
+    pub(crate) http_host: Vec<String>,
     /// Format of the log on stderr
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t = LogFormat::Text)]
     pub(crate) log_format: LogFormat,
@@ -116,13 +128,31 @@ pub(super) fn lease(text: &str) -> Result<Duration, String> {
 }
 
 fn tcp_address(text: &str) -> Result<SocketAddr, String> {
+    only_tcp(text, "Prometheus")
+}
+
+fn page_address(text: &str) -> Result<SocketAddr, String> {
+    only_tcp(text, "a browser")
+}
+
+fn only_tcp(text: &str, reader: &str) -> Result<SocketAddr, String> {
     match text.parse() {
         Ok(ListenAddress::Tcp(address)) => Ok(address),
         Ok(ListenAddress::Unix(_)) => {
-            Err("Prometheus cannot read from a Unix socket; write IP:PORT".to_owned())
+            Err(format!("{reader} cannot read from a Unix socket; write IP:PORT"))
         }
         Err(error) => Err(error.to_string()),
     }
+}
+
+fn host_name(text: &str) -> Result<String, String> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '.';
+    if text.is_empty() || text.len() > HOST_NAME_BYTES_MAX || !text.chars().all(allowed) {
+        return Err(
+            "it must be the name of a host without a port, such as bones.example.org".to_owned()
+        );
+    }
+    Ok(text.to_owned())
 }
 
 fn fraction(text: &str) -> Result<f64, String> {

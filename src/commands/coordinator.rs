@@ -8,7 +8,9 @@ use anyhow::Context as _;
 use osteon_common::visible;
 use osteon_coordinator::service::open_files;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
-use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress, MetricsListener};
+use osteon_coordinator::{
+    BindError, Config, Coordinator, ListenAddress, MetricsListener, PageBindError,
+};
 
 use crate::arguments::CoordinatorArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
@@ -24,7 +26,8 @@ use crate::telemetry;
 const HEARTBEATS_PER_LEASE: u32 = 5;
 
 /// Serves until SIGINT or SIGTERM, or until a part of it has ended unexpectedly. The URL in use is
-/// printed, and stands in DIR/address; that of the metrics stands in DIR/metrics-address.
+/// printed, and stands in DIR/address; those of the metrics and the live page stand in
+/// DIR/metrics-address and DIR/http-address.
 pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus, CommandFailure> {
     let address: ListenAddress = arguments.listen.parse().map_err(CommandFailure::bad_input)?;
     // Read before anything is bound or created.
@@ -49,6 +52,13 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
         Some(address) => {
             let metrics = MetricsListener::bind(address).await.map_err(CommandFailure::failed)?;
             listener.with_metrics(metrics)
+        }
+    };
+    let listener = match arguments.http {
+        None => listener,
+        Some(address) => {
+            let hosts = arguments.http_host.clone();
+            listener.with_page(address, arguments.insecure, hosts).await.map_err(page_failure)?
         }
     };
     let listener = listener.with_spans(telemetry::recorder());
@@ -87,13 +97,17 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
     served
 }
 
-/// Writes the URL of a coordinator, and that of its metrics, to files in its directory.
+/// Writes the URL of a coordinator, and those of its metrics and its live page, to files in its
+/// directory.
 fn write_addresses(
     directory: &Path,
     coordinator: &Coordinator,
 ) -> Result<Vec<PathBuf>, CommandFailure> {
-    let urls =
-        [("address", Some(coordinator.url())), ("metrics-address", coordinator.metrics_url())];
+    let urls = [
+        ("address", Some(coordinator.url())),
+        ("metrics-address", coordinator.metrics_url()),
+        ("http-address", coordinator.page_url()),
+    ];
     let urls = urls.into_iter().filter_map(|(name, url)| Some((directory.join(name), url?)));
     let written = urls.map(|(file, url)| {
         result_files::write(&file, &format!("{url}\n")).map_err(CommandFailure::Failed)?;
@@ -140,5 +154,12 @@ fn bind_failure(error: BindError) -> CommandFailure {
     match error {
         BindError::NotLoopback { .. } => CommandFailure::bad_input(error),
         _ => CommandFailure::failed(error),
+    }
+}
+
+fn page_failure(error: PageBindError) -> CommandFailure {
+    match error {
+        PageBindError::Refused { .. } => CommandFailure::failed(error),
+        _ => CommandFailure::bad_input(error),
     }
 }

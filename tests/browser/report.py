@@ -5,16 +5,11 @@
 makes reports of a simulation, of groups and of a comparison, and looks at each at three widths, light and dark.
 """
 
-import argparse
-import importlib.resources
-import pathlib
 import subprocess
 import sys
-import venv
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parent.parent
-WIDTHS = (1280, 800, 390)
+import looking
+from looking import ROOT
 
 
 def make_reports(osteon, work):
@@ -39,12 +34,7 @@ def problems_of(browser, page_file, width, scheme, axe):
             or found.append(f"request: {request.url}"))
     page.goto(page_file.as_uri())
     page.mouse.move(width / 2, 400)
-    if page.evaluate("document.documentElement.scrollWidth > window.innerWidth"):
-        found.append("the page is wider than its window")
-    page.evaluate(axe)
-    rules = page.evaluate(
-        "async () => (await axe.run()).violations.map((rule) => [rule.id, rule.nodes[0].html])")
-    found += [f"axe {rule}: {html[:200]}" for rule, html in rules]
+    found += looking.findings(page, axe)
     page.screenshot(path=page_file.with_name(f"{page_file.parent.name}-{width}-{scheme}.png"),
                     full_page=True)
     context.close()
@@ -54,14 +44,14 @@ def problems_of(browser, page_file, width, scheme, axe):
 def check(arguments):
     from playwright.sync_api import sync_playwright
 
-    axe = importlib.resources.files("axe_playwright_python").joinpath("axe.min.js").read_text()
+    axe = looking.axe_script()
     failed = False
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
             executable_path=arguments.chromium, args=["--no-sandbox"])
         for page_file in make_reports(arguments.osteon, arguments.work):
-            for width in WIDTHS:
-                for scheme in ("light", "dark"):
+            for width in looking.WIDTHS:
+                for scheme in looking.SCHEMES:
                     found = problems_of(browser, page_file, width, scheme, axe)
                     print(page_file, width, scheme, "; ".join(found) or "ok")
                     failed = failed or bool(found)
@@ -69,23 +59,5 @@ def check(arguments):
     return 1 if failed else 0
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--osteon", type=pathlib.Path, required=True)
-    parser.add_argument("--work", type=pathlib.Path, required=True)
-    parser.add_argument("--chromium", required=True)
-    arguments = parser.parse_args()
-    arguments.work.mkdir(parents=True, exist_ok=True)
-    environment = arguments.work / "venv"
-    if pathlib.Path(sys.prefix) == environment.resolve():
-        return check(arguments)
-    if not environment.exists():
-        venv.create(environment, with_pip=True)
-    python = environment / "bin/python"
-    subprocess.run([python, "-m", "pip", "install", "--quiet", "-r", HERE / "requirements.txt"],
-                   check=True, timeout=600)
-    return subprocess.run([python, *sys.argv]).returncode
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(looking.main(check, __doc__))

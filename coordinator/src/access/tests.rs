@@ -196,3 +196,21 @@ fn headers_are_tokens_or_not() {
     }
     assert_eq!(presented(Some(b"Bearer \xff")), Presented::Unreadable);
 }
+
+#[test]
+fn the_page_is_for_everybody_and_its_data_need_the_role_of_the_api() {
+    for (path, requirement) in [
+        ("/", Requirement::Nothing),
+        ("/page.js", Requirement::Nothing),
+        ("/events", Requirement::Role(Role::Read)),
+        ("/data/overview", Requirement::Role(Role::Read)),
+        ("/data/jobs", Requirement::Role(Role::Read)),
+        ("/data/jobs/7", Requirement::Role(Role::Read)),
+        ("/data/jobs/7/figures", Requirement::Role(Role::Read)),
+        ("/data/jobs/7/cancel", Requirement::Role(Role::Submit)),
+        ("/data/new", Requirement::Known),
+        ("//", Requirement::Known),
+    ] {
+        assert_eq!(page_need(path), requirement, "{path}");
+    }
+}

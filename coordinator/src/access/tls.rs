@@ -21,6 +21,9 @@ use webpki::EndEntityCert;
 
 use crate::access::{Certificate, Fault, WORKER_NAME};
 
+/// The protocol of the live page.
+const PAGES_ALPN: &[u8] = b"http/1.1";
+
 /// The files of a listener with TLS.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TlsFiles {
@@ -58,6 +61,8 @@ pub enum TlsError {
 #[derive(Clone)]
 pub struct Tls {
     pub(crate) acceptor: TlsAcceptor,
+    /// As `acceptor`, for browsers: HTTP/1.1, and no question for a certificate.
+    pub(crate) pages: TlsAcceptor,
     /// Verifies the certificates of peers.
     verifier: Arc<dyn ClientCertVerifier>,
     /// A host name that the certificate is for, preferably one that other machines can use.
@@ -81,6 +86,13 @@ impl Tls {
                 .allow_unauthenticated()
                 .build()
                 .map_err(|source| TlsError::Authority { path: files.ca.clone(), source })?;
+        let mut pages = ServerConfig::builder_with_provider(Arc::clone(&provider))
+            .with_protocol_versions(&[&TLS13])
+            .map_err(setup)?
+            .with_no_client_auth()
+            .with_single_cert(identity.chain.clone(), identity.key.clone_key())
+            .map_err(setup)?;
+        pages.alpn_protocols = vec![PAGES_ALPN.to_vec()];
         let mut config = ServerConfig::builder_with_provider(provider)
             .with_protocol_versions(&[&TLS13])
             .map_err(setup)?
@@ -88,7 +100,8 @@ impl Tls {
             .with_single_cert(identity.chain, identity.key)
             .map_err(setup)?;
         config.alpn_protocols = vec![ALPN.to_vec()];
-        Ok(Self { acceptor: TlsAcceptor::from(Arc::new(config)), verifier, host })
+        let [acceptor, pages] = [config, pages].map(|config| TlsAcceptor::from(Arc::new(config)));
+        Ok(Self { acceptor, pages, verifier, host })
     }
 
     /// Returns the result of the check of a peer's certificates; the peer has proved that it holds

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use osteon_common::job::JobSpecification;
+use osteon_common::results::Evaluation;
 use osteon_proto::batch::Work;
 use osteon_proto::v1::{ExplainResponse, JobSnapshot, ListWorkersResponse, WorkerSnapshot};
 use osteon_search::Summary;
@@ -192,6 +194,8 @@ pub enum Answer {
         /// Last job of the page, if there are more.
         more_after: Option<JobId>,
     },
+    /// The search of a job that has not ended.
+    Followed(SearchRows),
     /// The job has ended; its output is in the store.
     Ended(EndRecord),
     /// These ended jobs were deleted.
@@ -204,6 +208,15 @@ pub enum Answer {
     Worker(WorkerSnapshot),
     /// The request is refused.
     Refused(Refusal),
+}
+
+/// A part of the history of a search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchRows {
+    /// The specification of the job.
+    pub specification: Arc<JobSpecification>,
+    /// Rows with consecutive numbers.
+    pub rows: Vec<Evaluation>,
 }
 
 /// Why a request is refused.

@@ -145,6 +145,24 @@ pub enum Request {
         /// Maximum number of jobs to list.
         limit: usize,
     },
+    /// List snapshots of jobs, newest first.
+    Browse {
+        /// Which jobs.
+        which: JobChoice,
+        /// Last job of the page before.
+        before: Option<JobId>,
+        /// Maximum number of jobs to list.
+        limit: usize,
+    },
+    /// Follow the search of a job.
+    Follow {
+        /// The job.
+        job: JobId,
+        /// Number of the first row of its history that is wanted.
+        from: u64,
+        /// Maximum number of rows.
+        limit: usize,
+    },
     /// Cancel a job.
     Cancel(JobId),
     /// Fetch the output of an ended job.
@@ -157,6 +175,20 @@ pub enum Request {
     Workers,
     /// Drain a worker: it leaves when it has answered the batches that it holds.
     DrainWorker(WorkerId),
+}
+
+/// Which jobs are listed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum JobChoice {
+    /// All.
+    #[default]
+    All,
+    /// Those that run.
+    Running,
+    /// Those that have not begun.
+    Waiting,
+    /// Those that have ended.
+    Ended,
 }
 
 /// Rules for keeping ended jobs: a job is deleted only if neither rule keeps it.

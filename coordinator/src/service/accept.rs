@@ -68,20 +68,15 @@ pub(crate) fn connections(
     bound: BoundSocket,
     tls: Option<watch::Receiver<Tls>>,
 ) -> impl Stream<Item = io::Result<AcceptedConnection>> {
-    let acceptor = Acceptor {
-        bound,
-        tls,
-        places: Arc::new(Semaphore::new(open_files::connections_max())),
-        handshakes: JoinSet::new(),
-        complaint: None,
-    };
+    let acceptor = Acceptor::new(bound, tls, open_files::connections_max());
     stream::unfold(acceptor, |mut acceptor| async {
         let connection = acceptor.next().await;
         Some((Ok(connection), acceptor))
     })
 }
 
-struct Acceptor {
+/// Accepts connections of one listener.
+pub(crate) struct Acceptor {
     bound: BoundSocket,
     /// Read for each connection, because it may be replaced while the coordinator runs.
     tls: Option<watch::Receiver<Tls>>,
@@ -89,10 +84,33 @@ struct Acceptor {
     handshakes: JoinSet<Option<AcceptedConnection>>,
     /// Time of the last log line about failures to accept connections.
     complaint: Option<Instant>,
+    /// The connections are those of browsers.
+    is_of_pages: bool,
 }
 
 impl Acceptor {
-    async fn next(&mut self) -> AcceptedConnection {
+    fn new(bound: BoundSocket, tls: Option<watch::Receiver<Tls>>, most: usize) -> Self {
+        Self {
+            bound,
+            tls,
+            places: Arc::new(Semaphore::new(most)),
+            handshakes: JoinSet::new(),
+            complaint: None,
+            is_of_pages: false,
+        }
+    }
+
+    /// Returns an acceptor of at most `most` connections of browsers at a time.
+    pub(crate) fn of_pages(
+        listener: TcpListener,
+        tls: Option<watch::Receiver<Tls>>,
+        most: usize,
+    ) -> Self {
+        Self { is_of_pages: true, ..Self::new(BoundSocket::Tcp(listener), tls, most) }
+    }
+
+    /// Returns the next connection.
+    pub(crate) async fn next(&mut self) -> AcceptedConnection {
         loop {
             tokio::select! {
                 Some(ended) = self.handshakes.join_next() => {
@@ -114,7 +132,8 @@ impl Acceptor {
                     match (&self.tls, io) {
                         (Some(tls), Either::Left(stream)) => {
                             let tls = tls.borrow().clone();
-                            self.handshakes.spawn(handshake(tls, stream, place));
+                            let handshake = handshake(tls, self.is_of_pages, stream, place);
+                            self.handshakes.spawn(handshake);
                         }
                         (_, plain) => {
                             let io = Either::Right(plain);
@@ -156,11 +175,13 @@ async fn accept(
 
 async fn handshake(
     tls: Tls,
+    is_of_pages: bool,
     stream: TcpStream,
     place: OwnedSemaphorePermit,
 ) -> Option<AcceptedConnection> {
     let peer = stream.peer_addr().ok();
-    match timeout(HANDSHAKE_TIMEOUT, tls.acceptor.accept(stream)).await {
+    let acceptor = if is_of_pages { &tls.pages } else { &tls.acceptor };
+    match timeout(HANDSHAKE_TIMEOUT, acceptor.accept(stream)).await {
         Ok(Ok(stream)) => {
             let certificate = tls.certificate(stream.get_ref().1.peer_certificates());
             Some(AcceptedConnection::new(Either::Left(Box::new(stream)), certificate, place))

@@ -36,7 +36,7 @@ const REALIZATION_BLOCK: usize = 65_536;
 
 /// Requests one record from the store. The channel to the store is released at once, so that a
 /// pending read does not keep a coordinator from stopping.
-async fn read<T>(
+pub(crate) async fn read<T>(
     store: &mpsc::WeakSender<StoreCommand>,
     what: impl FnOnce(Reply<T>) -> ReadRequest,
 ) -> Result<T, Status> {

@@ -77,7 +77,8 @@ impl JobsService {
         })
     }
 
-    async fn ask(&self, request: event::Request) -> Result<Answer, Status> {
+    /// Asks the core.
+    pub(crate) async fn ask(&self, request: event::Request) -> Result<Answer, Status> {
         let (reply, answer) = oneshot::channel();
         self.send(Message::Ask(request, reply)).await?;
         answered(answer).await

@@ -19,6 +19,7 @@ use tokio::net::{TcpListener, UnixListener, UnixStream};
 use crate::access::Policy;
 use crate::access::tls::Tls;
 use crate::access::tokens::Tokens;
+use crate::live::listener::{PageBindError, PageListener};
 use crate::service::accept::BoundSocket;
 use crate::service::metrics_listener::MetricsListener;
 
@@ -99,6 +100,8 @@ pub struct Listener {
     pub(crate) policy: Policy,
     /// Present if metrics are exported.
     pub(crate) metrics: Option<MetricsListener>,
+    /// Present if the live page is served.
+    pub(crate) page: Option<PageListener>,
     /// Present if spans are recorded.
     pub(crate) spans: Option<Arc<dyn SpanRecorder>>,
     url: String,
@@ -149,7 +152,16 @@ impl Listener {
             _ => format!("https://{local}"),
         };
         let (bound, policy) = (BoundSocket::Tcp(listener), Policy::Tls(tokens));
-        Ok(Self { bound, file: None, tls: Some(tls), policy, metrics: None, spans: None, url })
+        Ok(Self {
+            bound,
+            file: None,
+            tls: Some(tls),
+            policy,
+            metrics: None,
+            page: None,
+            spans: None,
+            url,
+        })
     }
 
     /// Admits only holders of tokens.
@@ -162,6 +174,23 @@ impl Listener {
     #[must_use]
     pub fn with_metrics(self, metrics: MetricsListener) -> Self {
         Self { metrics: Some(metrics), ..self }
+    }
+
+    /// Serves the live page on an address of its own, to the same callers and with the same certificates.
+    /// It answers for the names `hosts`, too.
+    ///
+    /// # Errors
+    /// When the address can be reached from other machines without TLS, and `insecure` is not given, or
+    /// the operating system refuses it.
+    pub async fn with_page(
+        self,
+        address: SocketAddr,
+        insecure: bool,
+        hosts: Vec<String>,
+    ) -> Result<Self, PageBindError> {
+        let (tls, policy) = (self.tls.as_ref(), &self.policy);
+        let page = PageListener::bind(address, insecure, hosts, tls, policy).await?;
+        Ok(Self { page: Some(page), ..self })
     }
 
     /// Records the spans of jobs, if there is a recorder.
@@ -203,7 +232,16 @@ impl Listener {
 
     /// Returns a listener that admits everybody.
     fn open(bound: BoundSocket, file: Option<SocketFile>, url: String) -> Self {
-        Self { bound, file, tls: None, policy: Policy::Everybody, metrics: None, spans: None, url }
+        Self {
+            bound,
+            file,
+            tls: None,
+            policy: Policy::Everybody,
+            metrics: None,
+            page: None,
+            spans: None,
+            url,
+        }
     }
 }
 

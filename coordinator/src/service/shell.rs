@@ -25,6 +25,11 @@ use crate::config::Config;
 use crate::core::audit::AuditKey;
 use crate::core::reactor::Restored;
 use crate::core::state::State;
+use crate::live;
+use crate::live::gate::Gate;
+use crate::live::listener::PageListener;
+use crate::live::routes;
+use crate::live::source::PageSource;
 use crate::metrics::write_times::WriteTimes;
 use crate::service::accept;
 use crate::service::core_task::{Clock, Core, Message};
@@ -91,6 +96,7 @@ pub struct Coordinator {
     core: tokio::task::JoinHandle<()>,
     store: JoinHandle<()>,
     metrics: Option<MetricsTask>,
+    page: Option<PageTask>,
     shutdown_timeout: Duration,
     drained: bool,
 }
@@ -111,6 +117,39 @@ impl MetricsTask {
 }
 
 impl Drop for MetricsTask {
+    fn drop(&mut self) {
+        self.task.abort();
+    }
+}
+
+/// The task that serves the live page; it ends when this is dropped.
+#[derive(Debug)]
+struct PageTask {
+    url: String,
+    task: tokio::task::JoinHandle<()>,
+}
+
+impl PageTask {
+    fn start(
+        listener: PageListener,
+        source: PageSource,
+        policy: watch::Receiver<Arc<Policy>>,
+        tls: Option<watch::Receiver<Tls>>,
+    ) -> Self {
+        let url = listener.url().to_owned();
+        match listener.tunnel() {
+            Some(tunnel) => {
+                tracing::info!(%url, "live page; to see it from another machine: {tunnel}");
+            }
+            None => tracing::info!(%url, "live page"),
+        }
+        let gate = Gate::new(policy, listener.hosts.clone());
+        let router = routes::router(Arc::new(source), gate);
+        Self { url, task: tokio::spawn(live::listener::serve(listener, tls, router)) }
+    }
+}
+
+impl Drop for PageTask {
     fn drop(&mut self) {
         self.task.abort();
     }
@@ -151,18 +190,22 @@ pub async fn start(
     )
     .map_err(|source| StartError::Thread { source })?;
     let metrics = listener.metrics.take().map(|listener| {
-        MetricsTask::start(listener, MetricSources::new(messages.clone(), write_times))
+        MetricsTask::start(listener, MetricSources::new(messages.clone(), write_times.clone()))
     });
     let listener_spans = listener.spans.take();
     let (policy, decided) = watch::channel(Arc::new(listener.policy.clone()));
     let (tls, shown) = listener.tls.clone().map(watch::channel).unzip();
+    let page = listener.page.take().map(|listener| {
+        let source = PageSource::new(messages.clone(), &commands, write_times);
+        PageTask::start(listener, source, decided.clone(), shown.clone())
+    });
     let router = services(&messages, &commands, decided, config).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
     let server = serve(router, listener, shown, stopped);
     let server = tokio::spawn(guarded(failing.guard(ComponentFailure::Server), server));
     let guard = failing.guard(ComponentFailure::Core);
-    let meter = metrics.is_some().then(Meter::default);
+    let meter = (metrics.is_some() || page.is_some()).then(Meter::default);
     let spans = listener_spans.map(JobSpans::new);
     let core = Core::new(state, clock, commands, events, failing.clone(), meter, spans);
     let core = core.run(effects, inbox, from_store, config.tick);
@@ -179,6 +222,7 @@ pub async fn start(
         core,
         store,
         metrics,
+        page,
         shutdown_timeout: config.shutdown_timeout,
         drained: false,
     })
@@ -194,6 +238,11 @@ impl Coordinator {
     /// Returns the URL of the metrics, if they are exported.
     pub fn metrics_url(&self) -> Option<&str> {
         self.metrics.as_ref().map(|metrics| metrics.url.as_str())
+    }
+
+    /// Returns the URL of the live page, if it is served.
+    pub fn page_url(&self) -> Option<&str> {
+        self.page.as_ref().map(|page| page.url.as_str())
     }
 
     /// Replaces the accepted tokens, for every call that begins from now on. A coordinator that
@@ -248,6 +297,7 @@ impl Coordinator {
         self.core.abort();
         let _ = self.core.await;
         drop(self.metrics);
+        drop(self.page);
         let _ = self.stop_serving.send(());
         let mut server = self.server;
         if tokio::time::timeout(self.shutdown_timeout, &mut server).await.is_err() {

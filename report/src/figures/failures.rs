@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use osteon_common::outcome::FailureKind;
+
 use super::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
@@ -15,35 +17,53 @@ pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
     if finding.failed() == 0 {
         return Vec::new();
     }
-    let mut figures = vec![by_kind(finding)];
+    let failures = FailedRealizations {
+        kinds: finding.failures.iter().map(|(kind, count)| (*kind, *count)).collect(),
+        realizations: finding.realizations,
+        prefix: finding.prefix(),
+        suffix: finding.suffix(),
+    };
+    let mut figures = vec![by_kind(&failures)];
     figures.extend(along_indices(finding));
     figures
 }
 
-fn by_kind(finding: &Finding<'_>) -> Figure {
-    let names = finding.failures.keys().map(|kind| quantity::failure(kind.name())).collect();
+/// Failed realizations of one evaluation.
+pub(crate) struct FailedRealizations {
+    /// The kinds that occurred, with their counts.
+    pub(crate) kinds: Vec<(FailureKind, u64)>,
+    /// Number of all realizations.
+    pub(crate) realizations: u64,
+    /// Beginning of the name of the figure.
+    pub(crate) prefix: String,
+    /// End of its title.
+    pub(crate) suffix: String,
+}
+
+/// Returns the figure of failures by kind.
+pub(crate) fn by_kind(failures: &FailedRealizations) -> Figure {
+    let FailedRealizations { kinds, realizations, prefix, suffix } = failures;
+    let names = kinds.iter().map(|(kind, _)| quantity::failure(kind.name())).collect();
     let y = Axis::of_categories("", names);
-    let largest = finding.failures.values().copied().max().unwrap_or(1) as f64;
+    let largest = kinds.iter().map(|(_, count)| *count).max().unwrap_or(1) as f64;
     let x = Axis::linear("failed realizations").spanning(0.0, 1.08 * largest);
-    let title = format!("Failures by kind{}", finding.suffix());
-    let mut chart = Chart::new(format!("{}failures", finding.prefix()), title, x, y);
-    let kinds = finding.failures.iter();
-    let kinds = kinds.map(|(kind, count)| format!("{count} {}", quantity::failure(kind.name())));
-    chart.description = kinds.collect::<Vec<_>>().join(", ");
-    let bars = finding
-        .failures
-        .values()
+    let title = format!("Failures by kind{suffix}");
+    let mut chart = Chart::new(format!("{prefix}failures"), title, x, y);
+    let counts = kinds.iter();
+    let counts = counts.map(|(kind, count)| format!("{count} {}", quantity::failure(kind.name())));
+    chart.description = counts.collect::<Vec<_>>().join(", ");
+    let bars = kinds
+        .iter()
         .enumerate()
-        .map(|(place, count)| [0.0, *count as f64, place as f64 - 0.3, place as f64 + 0.3]);
-    chart.height = (0.12 * finding.failures.len() as f64 + 0.1).max(0.3);
+        .map(|(place, (_, count))| [0.0, *count as f64, place as f64 - 0.3, place as f64 + 0.3]);
+    chart.height = (0.12 * kinds.len() as f64 + 0.1).max(0.3);
     chart.layer("", Ink::Second, Shape::Rectangles(bars.collect()));
-    let share = 100.0 * finding.failed() as f64 / finding.realizations.max(1) as f64;
+    let failed: u64 = kinds.iter().map(|(_, count)| count).sum();
+    let share = 100.0 * failed as f64 / (*realizations).max(1) as f64;
     let reading = format!(
-        "{} of {} realizations ({}) have no velocity and count in no moment. Mostly slow bones fail, \
-         so that the mean is then too large and the variation too small; velocity.failure_bias in \
-         result.json estimates by how much.",
-        finding.failed(),
-        finding.realizations,
+        "{failed} of {realizations} realizations ({}) have no velocity and count in no moment. Mostly \
+         slow bones fail, so that the mean is then too large and the variation too small; \
+         velocity.failure_bias in result.json estimates by how much.",
         crate::number::digits(share, 2) + " %"
     );
     Figure { chart, reading }

@@ -1,6 +1,6 @@
 // Shows values under the pointer; the page is complete without it.
 "use strict";
-document.querySelectorAll("svg.chart[data-plot]").forEach((chart) => {
+const showValues = (chart) => {
   const [left, top, width, height] = chart.dataset.plot.split(" ").map(Number);
   const scale = (text) => {
     const [spacing, low, high] = text.split(" ");
@@ -50,4 +50,5 @@ document.querySelectorAll("svg.chart[data-plot]").forEach((chart) => {
     readout.style.top = `${event.clientY - outer.top + 16}px`;
   });
   chart.addEventListener("pointerleave", hide);
-});
+};
+document.querySelectorAll("svg.chart[data-plot]").forEach(showValues);

@@ -28,6 +28,7 @@ mod jobs;
 mod lost;
 mod notices;
 mod overdue;
+mod pages;
 mod prune;
 mod replay;
 mod saved;
@@ -267,6 +268,7 @@ fn answered(answer: &Answer) -> String {
             format!("{jobs:?}, more after {more_after:?}")
         }
         Answer::Explained(explained) => format!("{:?}", explained.reason()),
+        Answer::Followed(search) => format!("rows {}", search.rows.len()),
         Answer::Ended(end) => format!("ended {}", end.job),
         Answer::Pruned(jobs) => format!("pruned {}", jobs.len()),
         Answer::Banned(banned) => format!("banned {}", banned.len()),

@@ -1,6 +1,5 @@
 //! Client requests.
 
-use std::ops::Bound;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -15,6 +14,7 @@ use crate::core::explain;
 use crate::core::explain::facts::JobFacts;
 use crate::core::ids::{JobId, ReplyId, WorkerId};
 use crate::core::job::{Job, RequestName, Stage, identity};
+use crate::core::job_pages;
 use crate::core::reactor::turn::Turn;
 use crate::core::snapshot;
 use crate::core::state::State;
@@ -35,9 +35,17 @@ pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, request: Request) {
         }
         Request::Get(job) => Some(get(turn.state, job, turn.now)),
         Request::Explain(job) => Some(explain(turn.state, job, turn.now)),
-        Request::List { after, limit } => Some(list(turn.state, after, limit, turn.now)),
+        Request::List { after, limit } => {
+            Some(job_pages::oldest_first(turn.state, after, limit, turn.now))
+        }
+        Request::Browse { which, before, limit } => {
+            Some(job_pages::newest_first(turn.state, which, before, limit, turn.now))
+        }
+        Request::Follow { job, from, limit } => {
+            Some(job_pages::search_rows(turn.state, job, from, limit))
+        }
         Request::Cancel(job) => cancel(turn, reply_id, job),
-        Request::Fetch(job) => Some(fetch(turn.state, job)),
+        Request::Fetch(job) => Some(job_pages::end(turn.state, job)),
         Request::Banned => Some(banned(turn.state, turn.now)),
         Request::Workers => Some(Answer::Workers(worker_list::all(turn.state, turn.now))),
         Request::DrainWorker(worker) => Some(drain(turn, worker)),
@@ -164,19 +172,6 @@ fn explain(state: &State, job: JobId, now: Duration) -> Answer {
     })
 }
 
-fn list(state: &State, after: Option<JobId>, limit: usize, now: Duration) -> Answer {
-    let from = after.map_or(Bound::Unbounded, Bound::Excluded);
-    let range = (from, Bound::Unbounded);
-    let mut ids: Vec<JobId> = state.ended.range(range).map(|(id, _)| *id).take(limit + 1).collect();
-    ids.extend(state.jobs.range(range).map(|(id, _)| *id));
-    ids.sort_unstable();
-    let mut listed =
-        ids.into_iter().filter_map(|id| Some((id, snapshot::job_snapshot(state, id, now)?)));
-    let page: Vec<_> = listed.by_ref().take(limit).collect();
-    let more_after = listed.next().and_then(|_| page.last().map(|(id, _)| *id));
-    Answer::Page { snapshots: page.into_iter().map(|(_, snapshot)| snapshot).collect(), more_after }
-}
-
 /// Cancels a job; the client is answered when its end is durable.
 fn cancel(turn: &mut Turn, reply_id: ReplyId, id: JobId) -> Option<Answer> {
     match turn.state.jobs.get_mut(&id) {
@@ -186,16 +181,6 @@ fn cancel(turn: &mut Turn, reply_id: ReplyId, id: JobId) -> Option<Answer> {
             None
         }
         _ => Some(get(turn.state, id, turn.now)),
-    }
-}
-
-fn fetch(state: &State, id: JobId) -> Answer {
-    if let Some(ended) = state.ended.get(&id) {
-        return Answer::Ended(ended.end.clone());
-    }
-    match state.jobs.get(&id).map(|job| &job.stage) {
-        None | Some(Stage::StoringSubmission) => Answer::Refused(Refusal::NoJob { job: id }),
-        Some(_) => Answer::Refused(Refusal::NotEnded { job: id }),
     }
 }
 
