@@ -10,6 +10,7 @@ mod slurm;
 mod tools;
 mod umbridge;
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -147,6 +148,12 @@ pub(crate) struct RunArguments {
     /// Also write a report of the results to DIR/report, as `osteon report DIR` does
     #[arg(long, requires = "out")]
     pub(crate) report: bool,
+    /// Show the run in a browser while it lasts: serve the live page at ADDR, a loopback address
+    /// (127.0.0.1:PORT; port 0 selects a free port). Its URL is printed on stderr. The job is run on
+    /// this machine
+    #[arg(long, value_name = "ADDR", conflicts_with = "coordinator",
+          value_parser = services::own_page_address)]
+    pub(crate) http: Option<SocketAddr>,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,

@@ -2,6 +2,7 @@
 
 mod workers;
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -34,6 +35,21 @@ pub(crate) enum StoreLocation {
     Directory(PathBuf),
 }
 
+/// What is started.
+#[derive(Debug)]
+pub(crate) struct EmbeddedSetup {
+    /// Storage of the jobs.
+    pub(crate) store: StoreLocation,
+    /// Number of worker processes.
+    pub(crate) workers: u32,
+    /// Number of threads of each worker.
+    pub(crate) threads: u32,
+    /// Address of the live page, on this machine only; `None`: no page.
+    pub(crate) page: Option<SocketAddr>,
+    /// Ended jobs are deleted after this time; `None`: they are kept.
+    pub(crate) keep_ended: Option<Duration>,
+}
+
 /// A coordinator and its workers.
 pub(crate) struct Embedded {
     coordinator: Coordinator,
@@ -45,21 +61,19 @@ pub(crate) struct Embedded {
 
 impl Embedded {
     /// Starts coordinator and workers. `progress` increases whenever the workers have completed
-    /// something; ended jobs are deleted after `keep_ended`, if it is given.
+    /// something.
     pub(crate) async fn start(
-        store: StoreLocation,
-        workers: u32,
-        threads: u32,
+        setup: EmbeddedSetup,
         progress: Arc<AtomicU64>,
-        keep_ended: Option<Duration>,
     ) -> Result<Self, CommandFailure> {
+        let EmbeddedSetup { workers, threads, .. } = setup;
         let directory = private_directory().map_err(CommandFailure::Failed)?;
         let socket = directory.path().join("socket");
         let endpoint = Endpoint::Unix(socket.clone());
         let executable = std::env::current_exe()
             .context("cannot find this program to start workers")
             .map_err(CommandFailure::Failed)?;
-        let coordinator = start_coordinator(store, socket, keep_ended).await?;
+        let coordinator = start_coordinator(setup, socket).await?;
         let workers = Workers::start(executable, &endpoint, workers, threads, progress);
         Ok(Self { coordinator, workers, endpoint, _directory: directory })
     }
@@ -67,6 +81,11 @@ impl Embedded {
     /// Returns the address of the coordinator.
     pub(crate) fn endpoint(&self) -> &Endpoint {
         &self.endpoint
+    }
+
+    /// Returns the URL of the live page, if there is one.
+    pub(crate) fn page_url(&self) -> Option<&str> {
+        self.coordinator.page_url()
     }
 
     /// Completes when the workers or the coordinator cannot continue.
@@ -88,12 +107,18 @@ impl Embedded {
 }
 
 async fn start_coordinator(
-    store: StoreLocation,
+    setup: EmbeddedSetup,
     socket: PathBuf,
-    keep_ended: Option<Duration>,
 ) -> Result<Coordinator, CommandFailure> {
+    let EmbeddedSetup { store, page, keep_ended, .. } = setup;
     let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
     let listener = listener.map_err(CommandFailure::failed)?.with_spans(telemetry::recorder());
+    let listener = match page {
+        None => listener,
+        Some(page) => {
+            listener.with_page(page, false, Vec::new()).await.map_err(CommandFailure::failed)?
+        }
+    };
     let store: Box<dyn Store + Send> = match store {
         StoreLocation::Memory => Box::new(MemoryStore::new()),
         // Lost jobs are accepted here: this process submits its job again, and it is recomputed.

@@ -4,6 +4,7 @@ mod client;
 mod slurm;
 mod umbridge;
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -242,6 +243,8 @@ pub(crate) struct Run {
     pub(crate) out: Option<PathBuf>,
     /// Whether a report is written beside them.
     pub(crate) report: bool,
+    /// Address of its live page, if it has one.
+    pub(crate) page: Option<SocketAddr>,
     /// Output format.
     pub(crate) format: OutputFormat,
     /// Format of the progress.
@@ -371,11 +374,14 @@ fn resolve_run(
         name,
         out,
         report,
+        http,
         json,
         progress,
         verbosity,
     } = arguments;
     let files = CredentialFiles::from(credentials);
+    // A page of its own is one of a run on this machine.
+    let workers = workers.or(http.map(|_| WORKERS_DEFAULT));
     let location =
         Locating { workers, threads, coordinator, files }.location(cores, environment)?;
     Ok(Run {
@@ -385,6 +391,7 @@ fn resolve_run(
         name: name.unwrap_or_default(),
         out,
         report,
+        page: http,
         format: format(json),
         progress,
         verbosity,

@@ -135,6 +135,14 @@ fn page_address(text: &str) -> Result<SocketAddr, String> {
     only_tcp(text, "a browser")
 }
 
+/// Reads the address of the page of a run, which has no certificates.
+pub(super) fn own_page_address(text: &str) -> Result<SocketAddr, String> {
+    let address = page_address(text)?;
+    let advice = "a run shows its page on this machine only; write 127.0.0.1:PORT or [::1]:PORT, and \
+                  reach it from elsewhere by ssh -L";
+    if address.ip().is_loopback() { Ok(address) } else { Err(advice.to_owned()) }
+}
+
 fn only_tcp(text: &str, reader: &str) -> Result<SocketAddr, String> {
     match text.parse() {
         Ok(ListenAddress::Tcp(address)) => Ok(address),

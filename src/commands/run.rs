@@ -15,7 +15,7 @@ use osteon_solver::Isa;
 
 use crate::arguments::VerbosityArguments;
 use crate::client::{Client, Fetched, Remote, SubmitOptions};
-use crate::embedded::{Embedded, StoreLocation};
+use crate::embedded::{Embedded, EmbeddedSetup, StoreLocation};
 use crate::environment::Unused;
 use crate::exit_status::{CommandFailure, ExitStatus, Interruption, stdout_failure};
 use crate::output::{self, Detail, ShownResult};
@@ -69,7 +69,12 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
     let job = NamedJob { specification, name: &run.name, progress: shown };
     let fetched = match location {
         ConnectedLocation::Local { workers, threads } => {
-            run_locally(workers, threads, job, directory.as_ref(), interruption).await?
+            let store = directory.as_ref().map_or(StoreLocation::Memory, |directory| {
+                StoreLocation::Directory(directory.store())
+            });
+            let setup =
+                EmbeddedSetup { store, workers, threads, page: run.page, keep_ended: None };
+            run_locally(setup, job, directory.as_ref(), interruption).await?
         }
         ConnectedLocation::Coordinator(client) => {
             run_on_coordinator(*client, job, directory.as_ref(), interruption).await?
@@ -171,17 +176,16 @@ fn show(
 
 /// Runs the job on worker processes of this process.
 async fn run_locally(
-    workers: u32,
-    threads: u32,
+    setup: EmbeddedSetup,
     job: NamedJob<'_>,
     directory: Option<&ResultsDirectory>,
     interruption: impl Future<Output = Interruption>,
 ) -> Result<Fetched, CommandFailure> {
-    let store = directory
-        .map_or(StoreLocation::Memory, |directory| StoreLocation::Directory(directory.store()));
     let progress = Arc::new(AtomicU64::new(0));
-    let mut embedded =
-        Embedded::start(store, workers, threads, Arc::clone(&progress), None).await?;
+    let mut embedded = Embedded::start(setup, Arc::clone(&progress)).await?;
+    if let Some(url) = embedded.page_url() {
+        say(&format!("live page: {url} (until the run ends)"));
+    }
     let endpoint = embedded.endpoint().clone();
     let (files, unused) = (CredentialFiles::default(), Unused::default());
     let remote = Remote { endpoint, files, from_environment: false, unused };

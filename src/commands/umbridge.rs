@@ -11,7 +11,7 @@ use osteon_files::job_file::{self, FilePurpose};
 use osteon_proto::credentials::CredentialFiles;
 
 use crate::client::{Client, Remote};
-use crate::embedded::{Embedded, StoreLocation};
+use crate::embedded::{Embedded, EmbeddedSetup, StoreLocation};
 use crate::environment::Unused;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
@@ -47,9 +47,9 @@ pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFa
             remote
         }
         RunLocation::Local { workers, threads } => {
-            let (store, kept) = (StoreLocation::Memory, Some(KEPT));
-            let progress = Arc::clone(&evaluated);
-            let started = Embedded::start(store, workers, threads, progress, kept).await?;
+            let (store, keep_ended) = (StoreLocation::Memory, Some(KEPT));
+            let setup = EmbeddedSetup { store, workers, threads, page: None, keep_ended };
+            let started = Embedded::start(setup, Arc::clone(&evaluated)).await?;
             let (files, unused) = (CredentialFiles::default(), Unused::default());
             let endpoint = started.endpoint().clone();
             embedded = Some(started);
