@@ -72,8 +72,7 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
             let store = directory.as_ref().map_or(StoreLocation::Memory, |directory| {
                 StoreLocation::Directory(directory.store())
             });
-            let setup =
-                EmbeddedSetup { store, workers, threads, page: run.page, keep_ended: None };
+            let setup = EmbeddedSetup { store, workers, threads, page: run.page, keep_ended: None };
             run_locally(setup, job, directory.as_ref(), interruption).await?
         }
         ConnectedLocation::Coordinator(client) => {
