@@ -2,8 +2,8 @@
 
     live.py --osteon PROGRAM --work DIRECTORY --chromium PROGRAM
 
-submits jobs, watches one, cancels it by the keyboard, kills the coordinator and starts it again, gives a token; and
-looks at the page at three widths, light and dark. The rules of axe hold, no script fails, nothing but the coordinator
+submits jobs, watches one, cancels it by the keyboard, kills the coordinator and starts it again, gives a token, shows
+10,000 jobs and 1,000 workers; and looks at the page at three widths, light and dark. The rules of axe hold, no script fails, nothing but the coordinator
 is asked, and the page takes less than a fifth of the browser's main thread.
 """
 
@@ -18,9 +18,12 @@ import sys
 import threading
 import time
 
+import crowd
 import looking
 
 JOBS = 300
+# Of a coordinator that has much to show.
+CROWD_JOBS, CROWD_WORKERS = 10_000, 1000
 # The program's own bound of the wait for any state, s.
 PATIENCE = 60
 # Part of the main thread that a page may take.
@@ -227,6 +230,38 @@ def use(browser, coordinator, axe):
     return reader.ended()
 
 
+def many(browser, osteon, work, axe):
+    """Looks at a coordinator with thousands of jobs and workers, and turns the pages of its list."""
+    directory = work / "many"
+    directory.mkdir()
+    coordinator = Coordinator(osteon, directory)
+    people = crowd.Crowd(osteon, coordinator.listen, directory)
+    try:
+        people.attach(CROWD_WORKERS)
+        people.submit(CROWD_JOBS)
+        reader = Reader(browser, coordinator.http)
+        page = reader.page
+        reader.is_live()
+        page.locator("#n-all", has_text=f"{CROWD_JOBS:,}").wait_for()
+        page.locator("#t-workers", has_text=f"{CROWD_WORKERS:,}").wait_for()
+        for number in range(2, 7):
+            page.get_by_role("button", name="Older").press("Enter")
+            page.locator("#page-number", has_text=f"Page {number}").wait_for()
+        page.get_by_role("radio", name="Running").press("Space")
+        page.locator("#jobs tbody tr .state", has_text="running").first.wait_for()
+        page.get_by_role("radio", name="All").press("Space")
+        page.locator("#jobs tbody tr").nth(24).wait_for()
+        share = main_thread(reader)
+        print(f"main thread with {CROWD_JOBS} jobs and {CROWD_WORKERS} workers: {1000 * share:.0f} ms per second")
+        assert share < MAIN_THREAD_MAX, share
+        reader.problems += looking.findings(page, axe)
+        page.screenshot(path=work / "live-many.png", full_page=True)
+        return reader.ended()
+    finally:
+        people.leave()
+        coordinator.kill()
+
+
 def through_a_proxy(browser, coordinator):
     """Opens the page below a path of a proxy, and cancels a job there."""
     job = coordinator.submit("behind a proxy", 1000, 300)
@@ -321,6 +356,7 @@ def check(arguments):
             browser = playwright.chromium.launch(executable_path=arguments.chromium, args=["--no-sandbox"])
             found = see(browser, coordinator, job, axe, work)
             for name, problems in (("use", use(browser, coordinator, axe)),
+                                   ("many", many(browser, arguments.osteon, work, axe)),
                                    ("proxy", through_a_proxy(browser, coordinator)),
                                    ("token", give_token(browser, arguments.osteon, work, axe))):
                 print("live page", name, "; ".join(problems) or "ok")
