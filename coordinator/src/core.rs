@@ -2,6 +2,7 @@
 //! and the time, and returns effects; it knows no clock, no socket and no future.
 
 pub(crate) mod ahead;
+pub(crate) mod answer_delay;
 pub mod audit;
 pub(crate) mod batch;
 pub mod close_reason;

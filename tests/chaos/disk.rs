@@ -122,7 +122,7 @@ fn where_the_quota_ends_jobs_wait_and_go_on_when_it_is_raised() {
     let scratch = Scratch::new();
     let file = scratch.write("job.toml", &job(60, 20));
     let digest = undisturbed("identify", &file);
-    let limited = ["sh", "-c", "trap '' XFSZ; ulimit -S -f 200; exec \"$0\" \"$@\""];
+    let limited = ["sh", "-c", "trap '' XFSZ; ulimit -S -f 800; exec \"$0\" \"$@\""];
     let limited = limited.map(str::to_owned);
     let mut service = Service::start_in(&scratch, &scratch.path("store"), &limited, &[]);
     let _worker = service.worker(&scratch);

@@ -12,6 +12,7 @@ use osteon_proto::batch::Work;
 use osteon_proto::evaluation;
 
 use crate::config::Config;
+use crate::core::answer_delay::AnswerDelay;
 use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::event::Hello;
@@ -86,6 +87,8 @@ pub struct State {
     /// Overdue batches that wait for a duplicate on another worker; of several duplicates only the
     /// newest is listed.
     pub(crate) overdue: BTreeSet<BatchId>,
+    /// Delay of the answers of all workers.
+    pub(crate) delay: AnswerDelay,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
@@ -192,6 +195,7 @@ impl State {
             order: ServiceOrder::default(),
             fleet_changes: 0,
             overdue: BTreeSet::new(),
+            delay: AnswerDelay::default(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,

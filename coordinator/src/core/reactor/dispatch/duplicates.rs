@@ -31,13 +31,13 @@ pub(crate) fn duplicate_slow_batches(turn: &mut Turn) {
 
 /// Sends each worker that is `idle` a duplicate of the batch that has been out longest among those
 /// `worth` it. Batches younger than half the target time are about to be answered and are not
-/// duplicated.
+/// duplicated; nor are those whose answers may be on their way, because all answers are late.
 fn duplicate(
     turn: &mut Turn,
     idle: impl Fn(&ServicePlace) -> bool,
     worth: impl Fn(&State, &Batch) -> bool,
 ) {
-    let patience = turn.state.config.batch_target / 2;
+    let patience = turn.state.config.batch_target / 2 + LATE * turn.state.delay.mean();
     let old = |batch: &Batch, now: Duration| now.saturating_sub(batch.sent) >= patience;
     loop {
         let (state, now) = (&*turn.state, turn.now);

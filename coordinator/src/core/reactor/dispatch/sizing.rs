@@ -5,7 +5,8 @@
 //! A batch costs the coordinator, which serves one after another, some time. Where many workers share
 //! little work, a share is less than that is worth: then fewer workers get batches that keep them busy
 //! for longer. If one worker would take the time R for all that is left and a batch costs c, batches
-//! of √(R c) make the sum of both shortest.
+//! of √(R c) make the sum of both shortest. Longer ones than c for each worker are not needed for that:
+//! then the coordinator serves one worker after the other before the first is idle again.
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
@@ -48,7 +49,8 @@ pub(crate) fn batch_size(
     // A worker may be faster than the fleet was when it was measured.
     let left = (queued + further) as f64;
     let share = left * (weight / fleet.total.max(weight));
-    let worth = rate.map_or(0.0, |rate| (worth_s(left / rate) * rate).min(left));
+    let workers = state.workers.len();
+    let worth = rate.map_or(0.0, |rate| (worth_s(left / rate, workers) * rate).min(left));
     let most = (share / SHARE_DIVISOR).max(slots.min(share)).max(worth).ceil();
     let target = match rate {
         Some(rate) if further > 0 => rate * WORTH_S.min(state.config.batch_target.as_secs_f64()),
@@ -60,9 +62,11 @@ pub(crate) fn batch_size(
     if further == 0 { size } else { queued.div_ceil(queued.div_ceil(size).max(1)) }
 }
 
-/// Returns the time that a batch should take at least, s, given that of all that is left.
-fn worth_s(left_s: f64) -> f64 {
-    (left_s * BATCH_COST_S).sqrt().min(WORTH_S)
+/// Returns the time that a batch should take at least, s, given the time of all that is left and the
+/// number of workers.
+fn worth_s(left_s: f64, workers: usize) -> f64 {
+    let round_s = workers as f64 * BATCH_COST_S;
+    (left_s * BATCH_COST_S).sqrt().min(round_s.max(WORTH_S))
 }
 
 /// Returns the rate of all workers at a job. It is measured again after as many batches as there are

@@ -37,7 +37,7 @@ pub(crate) fn answered(
         return;
     };
     attached.last_seen = turn.now;
-    attached.answered = turn.now;
+    let answered_before = std::mem::replace(&mut attached.answered, turn.now);
     attached.rate.add(solved.len() as u64, turn.now);
     let name = attached.name.clone();
     let held = turn.state.batches.get(&batch).filter(|held| held.worker == worker);
@@ -65,7 +65,7 @@ pub(crate) fn answered(
     match purpose {
         Some(Purpose::Fill | Purpose::Exclusive | Purpose::Speculative) => {
             if let Some(held) = turn.state.settle(batch) {
-                measure(turn.state, &held, elapsed_s, turn.now);
+                measure(turn.state, &held, elapsed_s, (answered_before, turn.now));
             }
             take_back(turn, duplicates);
             fill(turn.state, &assignment, &solved, &name, turn.now);
@@ -122,11 +122,16 @@ fn fill(
     state.changed.insert(assignment.job);
 }
 
-/// Updates the rate of a worker and the pace of its job with an answer.
-fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, now: Duration) {
+/// Updates the rate of a worker, the pace of its job and the delay of answers with one that arrives `now`;
+/// `before` is the time of the worker's answer before it.
+fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, (before, now): (Duration, Duration)) {
     let plausible = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
     let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);
     let rate = batch.assignment.indices.count as f64 / if plausible { elapsed_s } else { waited_s };
+    // Others waited behind the batch before them.
+    if plausible && batch.sent >= before {
+        state.delay.learn(waited_s, elapsed_s);
+    }
     let Some(worker) = state.workers.get_mut(&batch.worker) else {
         return;
     };

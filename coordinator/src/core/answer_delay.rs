@@ -1,0 +1,50 @@
+//! How long answers take beside their computation: on the network, and in the queues before the core.
+//!
+//! A coordinator that is busy with the answers of thousands of workers sees all of them late. That is no
+//! reason to have anything computed twice.
+
+use std::time::Duration;
+
+/// Weight of the newest answer.
+const WEIGHT: f64 = 1.0 / 16.0;
+/// Longest delay that counts, s: a single answer may be later for a reason of its own.
+const LONGEST_S: f64 = 2.0;
+
+/// Mean delay of the answers that came last.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct AnswerDelay(f64);
+
+impl AnswerDelay {
+    /// Takes in an answer that arrived `waited_s` seconds after its batch was sent, of which its worker
+    /// computed for `computed_s`.
+    pub(crate) fn learn(&mut self, waited_s: f64, computed_s: f64) {
+        // What is not a number counts as no delay.
+        let delay = (waited_s - computed_s).max(0.0).min(LONGEST_S);
+        self.0 += WEIGHT * (delay - self.0);
+    }
+
+    /// Returns the mean delay.
+    pub(crate) fn mean(self) -> Duration {
+        Duration::from_secs_f64(self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_delay_follows_the_answers() {
+        let mut delay = AnswerDelay::default();
+        assert_eq!(delay.mean(), Duration::ZERO);
+        (0..200).for_each(|_| delay.learn(0.3, 0.1));
+        assert!((delay.mean().as_secs_f64() - 0.2).abs() < 1e-5, "{delay:?}");
+        (0..200).for_each(|_| delay.learn(0.1, 0.3));
+        assert!(delay.mean().as_secs_f64() < 1e-5, "{delay:?}");
+        for odd in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            delay.learn(odd, odd);
+            delay.learn(odd, 0.0);
+            assert!(delay.mean().as_secs_f64() <= LONGEST_S, "{odd}");
+        }
+    }
+}
