@@ -5,6 +5,10 @@
 
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
+#[path = "support/page.rs"]
+mod page;
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
 
 use std::collections::BTreeSet;
@@ -13,6 +17,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
 
+use page::Page;
 use serde_json::Value;
 use support::{
     Coordinator, Owned, Scratch, children, eventually, is_alive, job, option, osteon, run, signal,
@@ -252,8 +257,8 @@ fn a_run_whose_store_is_full_says_so_and_can_be_continued() {
     let scratch = Scratch::new();
     let out = scratch.path("out");
     let job = scratch.write("long.toml", &long_job());
-    // Files may not grow beyond 128 KiB, which is enough for some evaluations.
-    let limited = "trap '' XFSZ; ulimit -f 128; exec \"$@\"";
+    // Files may not grow beyond 512 KiB, which is enough for some evaluations.
+    let limited = "trap '' XFSZ; ulimit -f 512; exec \"$@\"";
     let program = osteon();
     let output = Command::new("bash")
         .args(["-c", limited, "bash"])
@@ -306,4 +311,39 @@ fn a_propagation_above_the_accepted_fraction_fails() {
     let result: Value = serde_json::from_str(&failed.stdout).unwrap();
     assert_eq!(result["failures"]["direct_wave_first"], 10);
     assert_eq!(result["velocity"]["mean"], Value::Null);
+}
+
+/// A run on this machine shows itself in a browser.
+#[test]
+fn a_run_of_ones_own_has_a_page_until_it_ends() {
+    let scratch = Scratch::new();
+    let (file, log) = (scratch.write("job.toml", &job(40, 300)), scratch.path("run.log"));
+    let mut command = osteon();
+    // The page is that of this machine, whatever the variable says.
+    command.env("OSTEON_COORDINATOR", "http://127.0.0.1:1");
+    command.args(["identify", text(&file), "--name", "mine", "--http", "127.0.0.1:0"]);
+    let mut process = Owned::spawn_logging(&mut command, &log);
+    let mut url = None;
+    eventually("the run names its page", || {
+        let log = fs::read_to_string(&log).unwrap();
+        let line = log.lines().find_map(|line| line.split_once("live page: http://"));
+        url = line.and_then(|(_, rest)| Some(rest.split_once("/ (")?.0.to_owned()));
+        url.is_some()
+    });
+    let page = Page { address: url.unwrap() };
+    let mut updates = page.events("job=1", &[]).unwrap();
+    updates.until("figures", |it| it["figures"].as_array().is_some_and(|all| !all.is_empty()));
+    assert_eq!(page.get("/data/jobs").json()["jobs"][0]["name"], "mine");
+    process.signal("TERM");
+    assert_eq!(process.code(), Some(143));
+    for (options, advice) in [
+        (&["--http", "0.0.0.0:0"][..], "on this machine only"),
+        (&["--http", "127.0.0.1:0", "--coordinator", "http://127.0.0.1:1"], "cannot be used with"),
+    ] {
+        let mut words = vec!["identify", text(&file)];
+        words.extend(options);
+        let refused = run(&words);
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(refused.stderr.contains(advice), "{refused:?}");
+    }
 }

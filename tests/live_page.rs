@@ -492,38 +492,3 @@ mod tls {
         answer
     }
 }
-
-/// A run on this machine shows itself in a browser.
-#[test]
-fn a_run_of_ones_own_has_a_page_until_it_ends() {
-    let scratch = Scratch::new();
-    let (file, log) = (scratch.write("job.toml", &job(40, 300)), scratch.path("run.log"));
-    let mut command = osteon();
-    // The page is that of this machine, whatever the variable says.
-    command.env("OSTEON_COORDINATOR", "http://127.0.0.1:1");
-    command.args(["identify", text(&file), "--name", "mine", "--http", "127.0.0.1:0"]);
-    let mut process = Owned::spawn_logging(&mut command, &log);
-    let mut url = None;
-    eventually("the run names its page", || {
-        let log = std::fs::read_to_string(&log).unwrap();
-        let line = log.lines().find_map(|line| line.split_once("live page: http://"));
-        url = line.and_then(|(_, rest)| Some(rest.split_once("/ (")?.0.to_owned()));
-        url.is_some()
-    });
-    let page = Page { address: url.unwrap() };
-    let mut updates = page.events("job=1", &[]).unwrap();
-    updates.until("figures", |it| it["figures"].as_array().is_some_and(|all| !all.is_empty()));
-    assert_eq!(page.get("/data/jobs").json()["jobs"][0]["name"], "mine");
-    process.signal("TERM");
-    assert_eq!(process.code(), Some(143));
-    for (options, advice) in [
-        (&["--http", "0.0.0.0:0"][..], "on this machine only"),
-        (&["--http", "127.0.0.1:0", "--coordinator", "http://127.0.0.1:1"], "cannot be used with"),
-    ] {
-        let mut words = vec!["identify", text(&file)];
-        words.extend(options);
-        let refused = run(&words);
-        assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(refused.stderr.contains(advice), "{refused:?}");
-    }
-}
