@@ -343,7 +343,9 @@ fn a_job_of_groups_whose_coordinator_is_killed_loses_nothing() {
             let worker = children(process.id()).into_iter().next();
             let url = worker.and_then(|worker| option(worker, "--coordinator"));
             let now = url.and_then(|url| evaluations(&url)).unwrap_or(0);
-            let more = now >= stored + 15;
+            // Many are stored at once, and a run that has ended stores no more.
+            assert_eq!(process.ended(), None, "it was too quick for this test");
+            let more = now >= stored + 5;
             stored = if more { now } else { stored };
             more
         });

@@ -42,6 +42,8 @@ pub(crate) struct Job {
     pub(crate) restart_pending: bool,
     /// An evaluation was damaged in the store and has been computed again.
     pub(crate) recomputed: bool,
+    /// Once `recomputed`: the last evaluation that the search has received.
+    pub(crate) received: Option<EvaluationRecord>,
     /// A client has cancelled it; it ends as soon as the record that is being stored is durable.
     pub(crate) cancelled: bool,
     pub(crate) rate: Rate,
@@ -80,6 +82,7 @@ impl Job {
             workers: BTreeSet::new(),
             restart_pending: false,
             recomputed: false,
+            received: None,
             cancelled: false,
             rate: Rate::default(),
             pace: RealizationTime::default(),

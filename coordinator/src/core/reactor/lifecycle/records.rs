@@ -38,6 +38,7 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
         {
             let (outcomes, estimated_error) = (record.outcomes.clone(), record.estimated_error);
             job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
+            job.received = job.recomputed.then(|| record.clone());
             job.workers.append(&mut record.workers);
             job.store_retry = None;
             job.search.tell(outcomes, estimated_error);
@@ -47,6 +48,7 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
             if records.last().is_some_and(|last| last.number == number) =>
         {
             job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
+            job.received = records.last().filter(|_| job.recomputed).cloned();
             let workers = records.iter_mut().map(|record| std::mem::take(&mut record.workers));
             job.workers.extend(workers.flatten());
             job.store_retry = None;

@@ -4,12 +4,12 @@
 //! path.
 
 use super::{jobs, records};
-use crate::core::effect::Effect;
+use crate::core::effect::{Effect, Record};
 use crate::core::evaluation::{PendingEvaluation, StoredRecord};
 use crate::core::event::ReadFailure;
 use crate::core::failure::RunFailure;
 use crate::core::ids::JobId;
-use crate::core::job::{Stage, StoreRetry};
+use crate::core::job::{After, Stage, StoreRetry};
 use crate::core::reactor::turn::Turn;
 use crate::store::EvaluationRecord;
 use osteon_search::Step;
@@ -107,11 +107,11 @@ fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
     };
     turn.state.changed.insert(id);
     job.progressed = turn.now;
+    let copy = job.recomputed.then(|| record.clone());
     let EvaluationRecord { number, point, outcomes, estimated_error, workers, .. } = record;
     if job.recomputed && job.search.expects(point).is_err() {
         // The damaged record held wrong outcomes, so the stored path ends here.
-        job.stored = number;
-        jobs::advance(turn, id);
+        end_path(turn, id);
     } else if doubtful && !job.cancelled {
         let realizations = job.record.specification.monte_carlo.realizations;
         match job.search.expects(point) {
@@ -128,10 +128,29 @@ fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
     } else {
         match job.search.replay(point, outcomes, estimated_error) {
             Ok(()) => {
+                job.received = copy;
                 job.workers.extend(workers);
                 jobs::advance(turn, id);
             }
             Err(error) => jobs::fail(turn, id, &error.into()),
         }
     }
+}
+
+/// Deletes the stored evaluations that the search will not come to, by storing the last one that it has
+/// received once more: after a restart nobody would know that they belong to another path.
+fn end_path(turn: &mut Turn, id: JobId) {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    job.stored = job.search.evaluations();
+    // The damaged evaluation was received after it had been computed again.
+    let Some(last) = job.received.clone() else {
+        jobs::advance(turn, id);
+        return;
+    };
+    let records = vec![last];
+    turn.effects.push(Effect::Store(Record::of_evaluations(records.clone(), true)));
+    let after = After::Ready(Box::new(job.search.clone()));
+    job.stage = Stage::StoringPrepared { records, is_last: true, after };
 }

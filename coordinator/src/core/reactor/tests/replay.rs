@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::*;
 use crate::core::event::ReadFailure;
+use crate::core::job::Stage;
 use crate::core::notice::Notice;
 use crate::core::reactor::Restored;
 use crate::core::worker_name::WorkerName;
@@ -134,9 +135,23 @@ fn what_came_of_a_damaged_evaluation_that_was_wrong_is_computed_again() {
     rig.check(stored(1, RecordKey::Evaluation(0)), &["read job 1 evaluation 1"]);
     // The search takes another path: the second evaluation is at the same point, the third is not.
     let mut number = 1;
-    while read(&mut rig, &store, number) == [format!("read job 1 evaluation {}", number + 1)] {
+    let next = |number| [format!("read job 1 evaluation {}", number + 1)];
+    let mut effects = read(&mut rig, &store, number);
+    while effects == next(number) {
         number += 1;
+        effects = read(&mut rig, &store, number);
     }
+    // The rest of the old path is deleted before anything else: the coordinator may be killed now.
+    let last = number - 1;
+    assert_eq!(effects, [format!("store job 1 evaluation {last}")]);
+    let Stage::StoringPrepared { records, is_last: true, .. } = &rig.state.jobs[&JobId(1)].stage
+    else {
+        panic!("{:?}", rig.state.jobs[&JobId(1)].stage);
+    };
+    let old = store.evaluation(JobId(1), last).unwrap().unwrap().outcomes;
+    // Only the first was wrong.
+    assert_eq!((records[0].number, records[0].outcomes == old), (last, last > 0));
+    rig.event(stored(1, RecordKey::Evaluation(last)));
     assert_eq!(rig.state.jobs[&JobId(1)].stored, number);
     let batch = batch_of(&rig, JobId(1));
     let effects = react(&mut rig.state, answer(1, batch, number, 1), rig.now);
