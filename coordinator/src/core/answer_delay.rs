@@ -18,8 +18,9 @@ impl AnswerDelay {
     /// Takes in an answer that arrived `waited_s` seconds after its batch was sent, of which its worker
     /// computed for `computed_s`.
     pub(crate) fn learn(&mut self, waited_s: f64, computed_s: f64) {
+        let delay = waited_s - computed_s;
         // What is not a number counts as no delay.
-        let delay = (waited_s - computed_s).max(0.0).min(LONGEST_S);
+        let delay = if delay > 0.0 { delay.min(LONGEST_S) } else { 0.0 };
         self.0 += WEIGHT * (delay - self.0);
     }
 
