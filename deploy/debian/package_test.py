@@ -1,6 +1,5 @@
 """The Debian package: builds it from the program at hand, and looks into it."""
 
-import gzip
 import os
 import pathlib
 import re
@@ -102,12 +101,12 @@ class Package(unittest.TestCase):
         lines = output(OSTEON, "--help").split("Commands:\n")[1].split("\n\n")[0].splitlines()
         commands = {line.split()[0] for line in lines if re.match(r"  \S", line)} - {"help"}
         self.assertGreater(len(commands), 15)
-        # cargo-deb compresses them.
+        # cargo-deb compresses only pages of the source; man reads both.
         pages = {path.name: path for path in (self.root / "usr/share/man/man1").iterdir()}
         for name in ["osteon", *(f"osteon-{command}" for command in sorted(commands))]:
-            self.assertIn(f"{name}.1.gz", pages)
+            self.assertIn(f"{name}.1", pages)
         version = output(OSTEON, "--version").split()[1]
-        text = gzip.decompress(pages["osteon.1.gz"].read_bytes()).decode()
+        text = pages["osteon.1"].read_text()
         self.assertIn(f"osteon {version}", text)
         self.assertIn("EXIT STATUS", text)
 
