@@ -42,7 +42,7 @@ pub(crate) struct Job {
     pub(crate) restart_pending: bool,
     /// An evaluation was damaged in the store and has been computed again.
     pub(crate) recomputed: bool,
-    /// Once `recomputed`: the last evaluation that the search has received.
+    /// The last evaluation that the search has received, if `recomputed`.
     pub(crate) received: Option<EvaluationRecord>,
     /// A client has cancelled it; it ends as soon as the record that is being stored is durable.
     pub(crate) cancelled: bool,

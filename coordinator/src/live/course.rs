@@ -40,7 +40,7 @@ pub(crate) struct FollowedSearch {
     is_stale: bool,
 }
 
-/// What was seen of a search.
+/// The rows of a search that its page has read so far, reduced to what its figures need.
 struct SeenRows {
     specification: Arc<JobSpecification>,
     /// The set of data whose search is shown.

@@ -47,7 +47,7 @@ pub(crate) fn updates(
     ReceiverStream::new(receiver)
 }
 
-/// What one page shows, and what was sent of it.
+/// The updates of one open page: its choices, its access, and the parts that were sent last.
 struct PageFeed {
     source: Arc<PageSource>,
     shown: Shown,

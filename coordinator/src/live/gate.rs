@@ -56,7 +56,7 @@ pub(crate) enum GateRefusal {
     Denied(#[from] AccessDenied),
 }
 
-/// Who sent a request, and with what credentials.
+/// The sender of a request: its credentials, with the gate that checks them again for each update.
 #[derive(Debug, Clone)]
 pub(crate) struct PageCaller {
     gate: Gate,

@@ -1,4 +1,4 @@
-//! What the core and the services say, as JSON.
+//! Jobs, workers, explanations, figures and refusals as JSON for the page.
 
 use std::collections::BTreeMap;
 
@@ -117,7 +117,7 @@ pub(crate) fn figures(figures: &[LiveFigure]) -> Value {
     figures.iter().map(figure).collect()
 }
 
-/// What is known of the workers of one host.
+/// Totals over the workers of one host.
 #[derive(Debug, Default)]
 struct HostLoad {
     workers: u64,

@@ -8,7 +8,7 @@ const ROWS: usize = 25;
 /// Maximum number of jobs in a page.
 const ROWS_MAX: usize = 100;
 
-/// What a page shows.
+/// The choices of a page: which jobs it lists, and which job and group it shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Shown {
     /// Which jobs are listed.

@@ -294,6 +294,7 @@ pub(crate) fn reopen(turn: &mut Turn, id: JobId) {
     job.store_retry = None;
     job.restart_pending = false;
     job.workers.clear();
+    job.received = None;
     job.search = Search::new(job.record.specification.clone());
     job.stage = Stage::Waiting;
     turn.state.waiting.push_back(id);
@@ -338,6 +339,7 @@ pub(crate) fn restart(turn: &mut Turn, id: JobId) {
     if let Some(job) = turn.state.jobs.get_mut(&id) {
         job.restart_pending = false;
         job.workers.clear();
+        job.received = None;
         job.search = Search::new(job.record.specification.clone());
         advance(turn, id);
     }

@@ -144,7 +144,7 @@ fn end_path(turn: &mut Turn, id: JobId) {
         return;
     };
     job.stored = job.search.evaluations();
-    // The damaged evaluation was received after it had been computed again.
+    // Without any, the whole path is computed again, and its first evaluation replaces the stored one.
     let Some(last) = job.received.clone() else {
         jobs::advance(turn, id);
         return;
