@@ -8,7 +8,7 @@ mod support;
 
 use std::process::Command;
 
-use support::{Scratch, job, osteon, run, text};
+use support::{Scratch, job, osteon, remove_settings, run, text};
 
 /// Runs the program on a terminal of 80 columns; returns all that it sent there. `None` where
 /// there is no `script` of util-linux.
@@ -24,7 +24,8 @@ fn on_terminal(arguments: &[&str], variables: &[(&str, &str)]) -> Option<String>
     }
     let mut command = Command::new("script");
     command.args(["--quiet", "--return", "--command", &line, "/dev/null"]);
-    command.env("TERM", "xterm").env_remove("OSTEON_COORDINATOR").env_remove("COLUMNS");
+    remove_settings(&mut command);
+    command.env("TERM", "xterm");
     let output = command.envs(variables.iter().copied()).output().unwrap();
     Some(String::from_utf8_lossy(&output.stdout).into_owned())
 }

@@ -72,6 +72,14 @@ pub(crate) fn text(path: &Path) -> &str {
 /// Returns a command for the program under test, without the caller's settings.
 pub(crate) fn osteon() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_osteon"));
+    remove_settings(&mut command);
+    command.stdin(Stdio::null());
+    command
+}
+
+/// Takes the caller's settings of the program under test out of a command's environment. Those of
+/// colours belong to them: `CI` lets a terminal of any kind show them.
+pub(crate) fn remove_settings(command: &mut Command) {
     for name in [
         "OSTEON_COORDINATOR",
         "OSTEON_TLS_CA",
@@ -81,11 +89,13 @@ pub(crate) fn osteon() -> Command {
         "OSTEON_INSTRUCTION_SET",
         "RUST_LOG",
         "COLUMNS",
+        "CI",
+        "NO_COLOR",
+        "CLICOLOR",
+        "CLICOLOR_FORCE",
     ] {
         command.env_remove(name);
     }
-    command.stdin(Stdio::null());
-    command
 }
 
 /// Runs the program to its end.
