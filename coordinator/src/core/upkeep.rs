@@ -6,8 +6,23 @@ use crate::core::ids::WorkerId;
 use crate::core::service_order::ServicePlace;
 use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
 
+/// Number of workers from which on one whose speed at a job is not known gets nothing beside its batch of
+/// that job. A second one, as small as the first, would cost more than the moment for which the worker is
+/// idle after its answer.
+const MANY_WORKERS: usize = 16;
+
 impl State {
-    /// Updates the place of a worker that has changed, come or gone.
+    /// Updates the places when a worker has come or gone.
+    pub(crate) fn came_or_went(&mut self, worker: WorkerId) {
+        self.fleet_changes += 1;
+        self.reorder(worker);
+        // It came and made them many, or went and made them few.
+        if [MANY_WORKERS, MANY_WORKERS - 1].contains(&self.workers.len()) {
+            self.reorder_all();
+        }
+    }
+
+    /// Updates the place of a worker that has changed.
     pub(crate) fn reorder(&mut self, worker: WorkerId) {
         let place = self.place(worker);
         self.order.put(worker, place);
@@ -39,15 +54,21 @@ impl State {
 
     /// Returns the place of a worker; `None` if it cannot accept more: it is gone, drains, computes a
     /// quarantined realization, or holds as many batches as it may. One on probation must hold
-    /// nothing.
+    /// nothing, and so must one of many that holds a batch of a job at which its speed is not known.
     fn place(&self, id: WorkerId) -> Option<ServicePlace> {
         let worker: &AttachedWorker = self.workers.get(&id)?;
         let is_exclusive = self.held_for(worker, Purpose::Exclusive).next().is_some();
         let on_probation = self.probation.has(&worker.name);
         let in_flight = worker.in_flight.len();
         let held = self.held(worker);
-        let most = if on_probation { 1 } else { BATCHES_IN_FLIGHT_MAX };
+        let is_tried = self.workers.len() >= MANY_WORKERS && self.is_tried(worker);
+        let most = if on_probation || is_tried { 1 } else { BATCHES_IN_FLIGHT_MAX };
         let may = !worker.draining && held < most && !is_exclusive;
         may.then_some(ServicePlace { on_probation, held, in_flight, worker: id })
+    }
+    /// Returns whether a worker holds a batch of a job at which its speed is not known.
+    fn is_tried(&self, worker: &AttachedWorker) -> bool {
+        let held = worker.in_flight.iter().filter_map(|id| self.batches.get(id));
+        held.map(|batch| batch.assignment.job).any(|job| !worker.rates.contains_key(&job))
     }
 }

@@ -33,6 +33,18 @@ mod schedule;
 pub(super) mod sizing;
 pub(super) mod speculation;
 
+/// Number of batches of unknown duration that are sent at once. The others follow with the next events,
+/// answers perhaps among them: then it is known how large a batch should be.
+const UNKNOWN_AT_ONCE: usize = 256;
+
+/// A batch or check that was sent.
+enum Sent {
+    /// It is known about how long it takes, or it is as large as it has to be.
+    Known,
+    /// The first of a worker, while too few others are known to tell how long it will take.
+    Unknown,
+}
+
 /// Sends batches while workers can accept more and work waits, then duplicates.
 pub(crate) fn dispatch(turn: &mut Turn) {
     if turn.state.draining {
@@ -40,7 +52,14 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     }
     let mut kept = poison::dispatch(turn);
     overdue::dispatch(turn, &mut kept);
-    while schedule::work_waits(turn.state) && hand_one(turn, &kept) {}
+    let mut unknown = 0;
+    while unknown < UNKNOWN_AT_ONCE && schedule::work_waits(turn.state) {
+        match hand_one(turn, &kept) {
+            Some(Sent::Known) => {}
+            Some(Sent::Unknown) => unknown += 1,
+            None => break,
+        }
+    }
     duplicates::duplicate_late_batches(turn);
     if kept.is_empty() && !schedule::work_waits(turn.state) {
         idle::dispatch(turn);
@@ -48,12 +67,10 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     duplicates::duplicate_slow_batches(turn);
 }
 
-/// Sends one check or batch to the first free worker that is eligible for it, and returns whether
-/// there was one. The workers in `kept` receive nothing.
-fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
-    let Some(first) = schedule::free_workers(turn.state, kept).next() else {
-        return false;
-    };
+/// Sends one check or batch to the first free worker that is eligible for it; `None` if there is none.
+/// The workers in `kept` receive nothing.
+fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> Option<Sent> {
+    let first = schedule::free_workers(turn.state, kept).next()?;
     let is_sound =
         |worker| turn.state.workers.get(&worker).is_some_and(|it| turn.state.is_sound(it));
     if !schedule::checks_wait(turn.state) && is_sound(first) {
@@ -62,25 +79,26 @@ fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
         return hand_batch(turn, first);
     }
     let free: Vec<WorkerId> = schedule::free_workers(turn.state, kept).collect();
-    free.into_iter().any(|worker| audits::hand_check(turn, worker) || hand_batch(turn, worker))
+    free.into_iter().find_map(|worker| {
+        if audits::hand_check(turn, worker) {
+            return Some(Sent::Known);
+        }
+        hand_batch(turn, worker)
+    })
 }
 
 /// Sends a worker a batch of the job that is next in turn.
-fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
-    let Some(job) = schedule::next_job(turn.state) else {
-        return false;
-    };
-    let Some((attempt, queued)) = turn.state.jobs.get(&job).and_then(next_evaluation) else {
-        return false;
-    };
-    let Some(attached) = turn.state.workers.get(&worker) else {
-        return false;
-    };
+fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<Sent> {
+    let job = schedule::next_job(turn.state)?;
+    let (attempt, queued) = turn.state.jobs.get(&job).and_then(next_evaluation)?;
+    let attached = turn.state.workers.get(&worker)?;
+    let mut sent = Sent::Known;
     let size = if turn.state.is_sound(attached) {
         let fleet = sizing::fleet_rate(turn.state, job);
-        let Some(attached) = turn.state.workers.get(&worker) else {
-            return false;
-        };
+        let attached = turn.state.workers.get(&worker)?;
+        if sizing::rate(attached, job, fleet).is_none() {
+            sent = Sent::Unknown;
+        }
         let further = turn.state.jobs.get(&job).map_or(0, ahead::left);
         sizing::batch_size(turn.state, attached, job, fleet, (queued, further))
     } else if !turn.state.probation.is_paused(&attached.name, turn.now)
@@ -88,15 +106,11 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     {
         1
     } else {
-        return false;
+        return None;
     };
-    let found = turn.state.jobs.get_mut(&job).and_then(|job| {
-        let mut evaluations = job.certain_mut();
-        evaluations.find(|it| it.attempt == attempt)?.take(size)
-    });
-    let Some(indices) = found else {
-        return false;
-    };
+    let mut evaluations = turn.state.jobs.get_mut(&job)?.certain_mut();
+    let indices = evaluations.find(|it| it.attempt == attempt)?.take(size)?;
+    drop(evaluations);
     turn.state.last_served = Some(job);
     ahead::refresh(turn, job);
     let assignment = Assignment { job, attempt, indices };
@@ -104,7 +118,7 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> bool {
     if let Some(batch) = batch {
         batches::charge(turn.state, batch);
     }
-    true
+    Some(sent)
 }
 
 /// Returns the attempt at the evaluation of a job whose realizations are sent next, with the number of

@@ -21,8 +21,7 @@ pub(crate) fn dismiss_if_drained(turn: &mut Turn, worker: WorkerId) {
 /// the batches that it held to the queue.
 pub(crate) fn depart(turn: &mut Turn, worker: WorkerId, why: Departure) -> Option<AttachedWorker> {
     let gone = turn.state.workers.remove(&worker)?;
-    turn.state.reorder(worker);
-    turn.state.fleet_changes += 1;
+    turn.state.came_or_went(worker);
     if turn.state.workers.is_empty() {
         turn.state.no_worker_since = turn.now;
     }

@@ -25,6 +25,9 @@ const SHARE_DIVISOR: f64 = 4.0;
 const BATCH_COST_S: f64 = 1e-4;
 /// Time that a batch takes its worker, s, from which on its cost does not matter.
 const WORTH_S: f64 = 0.02;
+/// Number of workers that must have computed something of a job before it is known how fast one of the
+/// others may be.
+const KNOWN_MIN: u64 = 8;
 /// Number of batches for which the rate of a fleet is used at least.
 const USES_MIN: u64 = 32;
 
@@ -33,6 +36,9 @@ const USES_MIN: u64 = 32;
 /// most a quarter of its share. Both limits give way to one realization for each slot (a realization
 /// may take longer than the target, and a share may hold fewer than four for each slot), but the share
 /// itself gives way only to a batch that is worth its cost.
+///
+/// The first batch of a worker is small, because nothing is known of its speed; if some others are known,
+/// it takes as long as it has to for one of their speed to be worth its cost.
 ///
 /// Where there are further evaluations, a batch takes no longer than it has to be worth its cost: then
 /// each of them, which is one of a chain, is soon complete. The batches of one are of about equal size.
@@ -43,23 +49,35 @@ pub(crate) fn batch_size(
     fleet: FleetRate,
     (queued, further): (u64, u64),
 ) -> u64 {
-    let rate = attached.rates.get(&job).copied();
     let slots = f64::from(attached.hello.slots);
+    let measured = attached.rates.get(&job).copied();
+    let rate = rate(attached, job, fleet);
     let weight = rate.unwrap_or(slots * fleet.per_slot);
     // A worker may be faster than the fleet was when it was measured.
     let left = (queued + further) as f64;
     let share = left * (weight / fleet.total.max(weight));
     let workers = state.workers.len();
-    let worth = rate.map_or(0.0, |rate| (worth_s(left / rate, workers) * rate).min(left));
+    let worth_s = rate.map_or(WORTH_S, |rate| worth_s(left / rate, workers));
+    let worth = rate.map_or(0.0, |rate| (worth_s * rate).min(left));
+    let target_s = state.config.batch_target.as_secs_f64();
     let most = (share / SHARE_DIVISOR).max(slots.min(share)).max(worth).ceil();
     let target = match rate {
-        Some(rate) if further > 0 => rate * WORTH_S.min(state.config.batch_target.as_secs_f64()),
-        Some(rate) => rate * state.config.batch_target.as_secs_f64(),
+        Some(rate) if further > 0 => rate * WORTH_S.min(target_s),
+        Some(rate) if measured.is_none() => rate * WORTH_S.max(worth_s).min(target_s),
+        Some(rate) => rate * target_s,
         None => f64::from(FIRST_BATCH_PER_SLOT) * slots,
     };
     // `as` saturates, and converts NaN to 0.
     let size = (target.max(slots).min(most) as u64).clamp(1, BATCH_REALIZATIONS_MAX.into());
     if further == 0 { size } else { queued.div_ceil(queued.div_ceil(size).max(1)) }
+}
+
+/// Returns the rate of a worker at a job, as measured, or that of its slots in the mean of the others if
+/// enough of them are known.
+pub(crate) fn rate(attached: &AttachedWorker, job: JobId, fleet: FleetRate) -> Option<f64> {
+    let of_others = || f64::from(attached.hello.slots) * fleet.per_slot;
+    let is_known = fleet.rated_workers >= KNOWN_MIN;
+    attached.rates.get(&job).copied().or_else(|| is_known.then(of_others))
 }
 
 /// Returns the time that a batch should take at least, s, given the time of all that is left and the

@@ -152,4 +152,7 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, (before, now): (Dur
     {
         state.shares.correct(&job.record.client, batch.charged, took);
     }
+    if is_first {
+        state.reorder(batch.worker);
+    }
 }

@@ -65,8 +65,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
             draining: false,
         },
     );
-    turn.state.reorder(worker);
-    turn.state.fleet_changes += 1;
+    turn.state.came_or_went(worker);
 }
 
 pub(crate) fn seen(state: &mut State, worker: WorkerId, now: Duration) {

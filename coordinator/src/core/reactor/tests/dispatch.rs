@@ -93,6 +93,54 @@ fn the_rate_of_the_fleet_is_measured_when_the_first_worker_answers() {
     assert_eq!((known.total, known.per_slot), (400.0, 100.0));
 }
 
+/// From the sixteenth on, a worker holds one batch until its speed at the job is known. Places are right
+/// when workers become many and few, which is checked after every event.
+#[test]
+fn each_of_many_workers_is_tried_with_one_batch() {
+    let mut rig = Rig::with(100_000, &[1; 15]);
+    let held =
+        |rig: &Rig, worker| rig.state.workers.get(&WorkerId(worker)).unwrap().in_flight.len();
+    assert_eq!(held(&rig, 15), 2);
+    rig.event(hello(16, 1));
+    assert_eq!(held(&rig, 16), 1);
+    rig.event(answer_in(0.004, 1, 1, 0, 4));
+    assert_eq!(held(&rig, 1), 2);
+    rig.event(hello(17, 1));
+    assert_eq!(held(&rig, 17), 1);
+    rig.event(end_of_stream(2));
+    rig.event(end_of_stream(3));
+    // Fifteen remain, and what the others held is sent again.
+    assert_eq!([16, 17].map(|worker| held(&rig, worker)), [2; 2]);
+}
+
+/// Of six hundred workers, 256 are tried at once. The others follow with the next events; when eight have
+/// answered, they get batches that are worth what they cost.
+#[test]
+fn a_job_on_many_workers_begins_with_few_batches_of_unknown_duration() {
+    let mut rig = Rig::new();
+    for worker in 1..=600 {
+        rig.event(hello(worker, 2));
+    }
+    let mut sends = |event| {
+        let effects = rig.event(event);
+        let count = |effect: &String| {
+            let (first, count) = effect.rsplit_once('+')?;
+            first.starts_with("send ").then(|| count.parse::<u64>().unwrap())
+        };
+        effects.iter().filter_map(count).collect::<Vec<u64>>()
+    };
+    assert!(sends(submit(1, "", propagation(1_000_000))).is_empty());
+    assert_eq!(sends(stored(1, RecordKey::Job)), [8; 256]);
+    // 8 in 4 ms are 2000 per second.
+    for batch in 1..8 {
+        let first = 8 * (batch - 1);
+        let sent = sends(answer_in(0.004, batch, batch, first, 8));
+        assert!(sent.iter().filter(|count| **count == 8).count() <= 256, "{batch}: {sent:?}");
+    }
+    let sent = sends(answer_in(0.004, 8, 8, 56, 8));
+    assert!(!sent.is_empty() && sent.iter().all(|count| *count > 100), "{sent:?}");
+}
+
 #[test]
 fn slow_realizations_keep_every_thread_of_a_worker_busy() {
     let mut rig = Rig::with(1000, &[8]);
