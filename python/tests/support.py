@@ -16,6 +16,9 @@ from typing import Any
 import osteon
 from osteon import _program
 
+# A shell starts what runs in the background with Ctrl-C ignored; the tests press it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 EXAMPLES = ROOT / "examples"
 CASE_A = EXAMPLES / "cases" / "A.toml"
