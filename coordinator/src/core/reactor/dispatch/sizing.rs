@@ -37,8 +37,9 @@ const USES_MIN: u64 = 32;
 /// may take longer than the target, and a share may hold fewer than four for each slot), but the share
 /// itself gives way only to a batch that is worth its cost.
 ///
-/// The first batch of a worker is small, because nothing is known of its speed; if some others are known,
-/// it takes as long as it has to for one of their speed to be worth its cost.
+/// The first batch of a worker is small, because nothing is known of its speed, but has a realization for
+/// each slot, whatever its share. If some others are known, it takes as long as it has to for one of their
+/// speed to be worth its cost.
 ///
 /// Where there are further evaluations, a batch takes no longer than it has to be worth its cost: then
 /// each of them, which is one of a chain, is soon complete. The batches of one are of about equal size.
@@ -60,7 +61,9 @@ pub(crate) fn batch_size(
     let worth_s = rate.map_or(WORTH_S, |rate| worth_s(left / rate, workers));
     let worth = rate.map_or(0.0, |rate| (worth_s * rate).min(left));
     let target_s = state.config.batch_target.as_secs_f64();
-    let most = (share / SHARE_DIVISOR).max(slots.min(share)).max(worth).ceil();
+    // As long as nothing is known, one for each slot takes no longer than fewer.
+    let filled = if rate.is_some() { slots.min(share) } else { slots };
+    let most = (share / SHARE_DIVISOR).max(filled).max(worth).ceil();
     let target = match rate {
         Some(rate) if further > 0 => rate * WORTH_S.min(target_s),
         Some(rate) if measured.is_none() => rate * WORTH_S.max(worth_s).min(target_s),

@@ -26,6 +26,8 @@ fn batches_take_the_target_time_and_leave_work_for_the_others() {
     // Unknown rate: four realizations per thread.
     check_size(&[2], &[None], 10_000, 8);
     check_size(&[64], &[None], 10_000, 256);
+    // Where a share is small, one per thread: they take no longer than fewer.
+    check_size(&[16; 1000], &[None; 1000], 2747, 16);
     // Measured rate: 200 ms.
     check_size(&[2], &[Some(5000.0)], 10_000, 1000);
     check_size(&[1], &[Some(0.1)], 10_000, 1);
