@@ -30,13 +30,17 @@ pub(crate) struct FleetArguments {
     #[arg(long, value_name = "TIME,…", value_delimiter = ',', default_value = "1ms",
           value_parser = time)]
     each: Vec<Duration>,
-    /// Realizations of the job, a propagation
+    /// Realizations of the job, a propagation, or of each evaluation with --search
     #[arg(long, value_name = "N", default_value_t = 1_000_000,
           value_parser = clap::value_parser!(u64).range(1..=REALIZATIONS_MAX))]
     realizations: u64,
     /// The job is an identification of K groups instead (N = 1024, Sobol' points, Newton's method)
     #[arg(long, value_name = "K", conflicts_with = "realizations", value_parser = groups)]
     groups: Option<usize>,
+    /// The job is an identification by a simplex with at most E evaluations of --realizations each instead
+    #[arg(long, value_name = "E", conflicts_with = "groups",
+          value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    search: Option<u64>,
     /// Also a fleet of which this share vanishes when half of the realizations are answered
     #[arg(long, value_name = "SHARE", value_parser = share)]
     kill: Option<f64>,
@@ -80,9 +84,11 @@ impl FleetArguments {
     /// # Errors
     /// If a share is that of no worker or of all, or if a job would take hours.
     pub(crate) fn rows(&self) -> Result<Vec<Row>> {
-        let job = match self.groups {
-            Some(groups) => Job::Groups(groups),
-            None => Job::Propagation(self.realizations),
+        let realizations = self.realizations;
+        let job = match (self.groups, self.search) {
+            (Some(groups), _) => Job::Groups(groups),
+            (None, Some(evaluations)) => Job::Search { evaluations, realizations },
+            (None, None) => Job::Propagation(realizations),
         };
         let mut rows = Vec::new();
         for &each in &self.each {

@@ -30,6 +30,13 @@ pub(crate) enum Job {
     Propagation(u64),
     /// An identification of so many groups.
     Groups(usize),
+    /// An identification by a simplex: one evaluation after the other.
+    Search {
+        /// Their number, at most.
+        evaluations: u64,
+        /// Realizations of each.
+        realizations: u64,
+    },
 }
 
 impl Job {
@@ -37,6 +44,9 @@ impl Job {
         match self {
             Self::Propagation(realizations) => fake::propagation(realizations, 2),
             Self::Groups(groups) => grouped(groups),
+            Self::Search { evaluations, realizations } => {
+                fake::identification(realizations, evaluations, 2)
+            }
         }
     }
 
@@ -50,6 +60,16 @@ impl Job {
         match self {
             Self::Propagation(realizations) => realizations,
             Self::Groups(groups) => groups as u64 * OF_SEARCH * OF_GROUP,
+            Self::Search { evaluations, realizations } => evaluations * realizations,
+        }
+    }
+
+    /// Returns the number of points of which each must be complete before the next is known, if it
+    /// evaluates `points`.
+    pub(crate) fn in_a_chain(self, points: u64) -> u64 {
+        match self {
+            Self::Propagation(_) | Self::Groups(_) => 1,
+            Self::Search { .. } => points.max(1),
         }
     }
 }

@@ -65,7 +65,7 @@ pub(crate) async fn measure(row: &Row) -> Result<Measured> {
     let left = bench.client.fetch(&id).await?;
     Ok(Measured {
         row: *row,
-        ideal: row.ideal(left.realizations),
+        ideal: row.ideal(left.realizations, left.points),
         took,
         batches: answered.batches - before.batches,
         answered: answered.realizations - before.realizations,
@@ -94,7 +94,7 @@ impl Bench {
         job: &JobSpecification,
         disturbance: Option<Disturbance>,
     ) -> Result<(Duration, String)> {
-        let limit = 10 * self.row.ideal(self.row.job.expected()) + JOB_LIMIT;
+        let limit = 10 * self.row.ideal(self.row.job.expected(), 1) + JOB_LIMIT;
         let half = self.fleet.progress().realizations + self.row.job.expected().div_ceil(2);
         let Self { coordinator, fleet, client, .. } = self;
         let begun = Instant::now();
@@ -138,9 +138,9 @@ async fn disturb(
 }
 
 impl Row {
-    /// Returns the time that so many realizations take on all slots, or, if workers are lost half
-    /// way, the second half on those that remain.
-    fn ideal(&self, realizations: u64) -> Duration {
+    /// Returns the time that so many realizations of `points` points take on all slots, or, if workers are
+    /// lost half way, the second half on those that remain.
+    fn ideal(&self, realizations: u64, points: u64) -> Duration {
         let share = match self.disturbance {
             Some(Disturbance::Workers(lost, _)) => {
                 let remaining = f64::from(self.workers - lost) / f64::from(self.workers);
@@ -149,7 +149,8 @@ impl Row {
             Some(Disturbance::Restart) | None => 1.0,
         };
         let slots = f64::from(self.workers) * f64::from(self.slots);
-        self.each.mul_f64((share * realizations as f64 / slots).max(1.0))
+        let chain = self.job.in_a_chain(points) as f64;
+        self.each.mul_f64((share * realizations as f64 / slots).max(chain))
     }
 }
 
@@ -166,6 +167,9 @@ impl Measured {
         let job = match self.row.job {
             Job::Propagation(realizations) => format!("{realizations}"),
             Job::Groups(groups) => format!("{groups} groups, {} points", self.points),
+            Job::Search { realizations, .. } => {
+                format!("{} points of {realizations}", self.points)
+            }
         };
         let took = self.took.as_secs_f64();
         let realizations = self.realizations as f64;
