@@ -21,6 +21,7 @@ mod logging;
 mod manual;
 mod new_files;
 mod observations;
+mod other_version;
 mod output;
 mod program;
 mod progress;

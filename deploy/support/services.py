@@ -11,6 +11,9 @@ import time
 WAIT_S = 60
 POLL_S = 0.05
 
+# `nohup` has this ignored in all that it starts, and a service ends by it.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
 
 def wait_for(what, condition):
     """Polls until a condition holds, and returns its value; fails after WAIT_S."""

@@ -24,7 +24,7 @@ use crate::request_id::RequestId;
 use crate::resolved::{Run, RunLocation};
 use crate::results_directory::ResultsDirectory;
 use crate::signals;
-use crate::{cost, report_directory, result_status, unsearched_groups, warnings};
+use crate::{cost, other_version, report_directory, result_status, unsearched_groups, warnings};
 
 /// Runs the job, or shows the result of an earlier run.
 pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, CommandFailure> {
@@ -252,5 +252,11 @@ async fn drive(
         })
         .await?;
     progress.finish();
-    Ok(client.fetch(&job).await?)
+    let fetched = client.fetch(&job).await?;
+    let Fetched { specification: computed, result, .. } = &fetched;
+    let note = other_version::check(specification, computed, &result.program);
+    if let Some(note) = note.map_err(CommandFailure::failed)? {
+        say(&note);
+    }
+    Ok(fetched)
 }

