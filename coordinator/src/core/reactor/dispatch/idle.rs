@@ -12,7 +12,7 @@ use osteon_common::job::JobKind;
 use osteon_common::parameters::Point;
 
 use super::{batches, eta, sizing};
-use crate::core::batch::{Assignment, Purpose};
+use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::fairness;
 use crate::core::ids::{JobId, WorkerId};
@@ -21,18 +21,29 @@ use crate::core::job::{Job, Stage};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
 
+/// Maximum number of idle workers that are looked at after an event: a walk over a large fleet would take
+/// longer than its speculation is worth.
+const IDLE_AT_ONCE: usize = 256;
+/// Number of speculative batches that may be out however soon they are computed: a coordinator of few
+/// workers has time for them.
+const OUT_MIN: usize = 16;
+
 /// ETA of the last batch of each evaluation that a search waits for.
 type Etas = BTreeMap<JobId, Duration>;
 
-/// Sends speculative batches to the workers with idle slots.
+/// Sends speculative batches to the workers with idle slots, as many as cost the coordinator no time that
+/// the search waits for.
 pub(crate) fn dispatch(turn: &mut Turn) {
     if next(turn.state).is_none() {
         return;
     }
+    let speculative = |batch: &&Batch| batch.purpose == Purpose::Speculative;
+    let mut out = turn.state.batches.values().filter(speculative).count();
     // Those that hold a speculative batch get no other.
     let without = (0..BATCHES_IN_FLIGHT_MAX).flat_map(|held| turn.state.order.holding(held));
     let idle = without.filter_map(|id| Some((id, spare(turn.state, turn.state.workers.get(&id)?))));
-    let idle: Vec<(WorkerId, u64)> = idle.filter(|(_, slots)| *slots > 0).collect();
+    let idle: Vec<(WorkerId, u64)> =
+        idle.filter(|(_, slots)| *slots > 0).take(IDLE_AT_ONCE).collect();
     let mut slots: u64 = idle.iter().map(|(_, slots)| slots).sum();
     let etas = eta::etas(turn.state);
     let mut wanted = next(turn.state);
@@ -41,11 +52,23 @@ pub(crate) fn dispatch(turn: &mut Turn) {
             return;
         };
         if !waits(turn.state, job, &point, worker, slots, &etas, turn.now) {
-            send(turn, job, point, worker);
+            let size = size(turn.state, job, &point, worker);
+            if out >= out_max(turn.state, job, worker, size) {
+                return;
+            }
+            send(turn, job, point, worker, size);
+            out += 1;
             slots -= spare;
             wanted = next(turn.state);
         }
     }
+}
+
+/// Returns the number of speculative batches of this size that may be out at a time: as many as the
+/// coordinator serves while one is computed. More of them would delay the answers that the search waits for.
+fn out_max(state: &State, id: JobId, worker: WorkerId, size: u64) -> usize {
+    let rate = state.workers.get(&worker).and_then(|it| it.rates.get(&id));
+    rate.map_or(OUT_MIN, |rate| sizing::served_within(size as f64 / rate).max(OUT_MIN))
 }
 
 /// Chooses the point to compute speculatively next, and its job. First come points that a search
@@ -73,7 +96,7 @@ fn next(state: &State) -> Option<(JobId, Point)> {
 }
 
 /// Returns whether the idle slots of a worker should stay idle; `slots` is the number of idle slots
-/// of all workers.
+/// of all workers that are looked at.
 fn waits(
     state: &State,
     id: JobId,
@@ -137,20 +160,21 @@ fn has_next(job: &Job) -> bool {
     next.is_some_and(|next| next.queue.is_empty())
 }
 
-/// Sends a batch of a point to the idle slots of a worker.
-fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId) {
-    let fleet = sizing::fleet_rate(turn.state, id);
-    let (Some(job), Some(attached)) = (turn.state.jobs.get(&id), turn.state.workers.get(&worker))
-    else {
-        return;
+/// Returns the size of a batch of a point for the idle slots of a worker.
+fn size(state: &mut State, id: JobId, point: &Point, worker: WorkerId) -> u64 {
+    let fleet = sizing::fleet_rate(state, id);
+    let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
+        return 0;
     };
-    let (queued, spare) = (queued(job, &point), spare(turn.state, attached));
-    let size = match batches::realizations_held(turn.state, attached) {
-        0 => {
-            sizing::batch_size(turn.state, attached, id, fleet, (queued, 0)).max(spare.min(queued))
-        }
+    let (queued, spare) = (queued(job, point), spare(state, attached));
+    match batches::realizations_held(state, attached) {
+        0 => sizing::batch_size(state, attached, id, fleet, (queued, 0)).max(spare.min(queued)),
         _ => spare,
-    };
+    }
+}
+
+/// Sends a batch of a point to the idle slots of a worker.
+fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId, size: u64) {
     let Some((attempt, indices)) = take(turn.state, id, point, size) else {
         return;
     };

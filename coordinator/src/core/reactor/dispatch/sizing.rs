@@ -58,7 +58,9 @@ pub(crate) fn batch_size(
     let left = (queued + further) as f64;
     let share = left * (weight / fleet.total.max(weight));
     let workers = state.workers.len();
-    let worth_s = rate.map_or(WORTH_S, |rate| worth_s(left / rate, workers));
+    let all =
+        state.jobs.get(&job).map_or(0, |job| job.record.specification.monte_carlo.realizations);
+    let worth_s = rate.map_or(WORTH_S, |rate| worth_s(left / rate, all as f64 / rate, workers));
     let worth = rate.map_or(0.0, |rate| (worth_s * rate).min(left));
     let target_s = state.config.batch_target.as_secs_f64();
     // As long as nothing is known, one for each slot takes no longer than fewer.
@@ -83,11 +85,20 @@ pub(crate) fn rate(attached: &AttachedWorker, job: JobId, fleet: FleetRate) -> O
     attached.rates.get(&job).copied().or_else(|| is_known.then(of_others))
 }
 
-/// Returns the time that a batch should take at least, s, given the time of all that is left and the
-/// number of workers.
-fn worth_s(left_s: f64, workers: usize) -> f64 {
+/// Returns the time that a batch should take at least, s, given the time of all that is left, that of the
+/// whole evaluation and the number of workers. If these suffice for one batch each, all batches are equal.
+/// Otherwise they become smaller, so that all workers finish together.
+fn worth_s(left_s: f64, all_s: f64, workers: usize) -> f64 {
     let round_s = workers as f64 * BATCH_COST_S;
-    (left_s * BATCH_COST_S).sqrt().min(round_s.max(WORTH_S))
+    let best = |seconds: f64| (seconds * BATCH_COST_S).sqrt();
+    let basis_s = if all_s <= best(all_s) * workers as f64 { all_s.max(left_s) } else { left_s };
+    best(basis_s).min(round_s.max(WORTH_S))
+}
+
+/// Returns the number of batches that the coordinator serves within some time, s.
+pub(crate) fn served_within(seconds: f64) -> usize {
+    // `as` saturates, and converts NaN to 0.
+    (seconds / BATCH_COST_S) as usize
 }
 
 /// Returns the rate of all workers at a job. It is measured again after as many batches as there are

@@ -67,6 +67,24 @@ fn batches_take_the_target_time_and_leave_work_for_the_others() {
     check_size(&[8, 8], &[Some(5000.0), Some(5000.0)], 1, 1);
 }
 
+/// If there are enough workers for one batch each, all batches of an evaluation are equal: smaller ones at
+/// its end would only be more. Few workers get smaller ones, so that they finish together.
+#[test]
+fn batches_of_an_evaluation_are_equal_if_all_are_computed_at_once() {
+    for (workers, queued, expected) in
+        [(100, 2747, 67), (100, 1000, 67), (100, 30, 30), (10, 2747, 69), (10, 1000, 40)]
+    {
+        let mut rig = Rig::with(2747, &vec![16; workers]);
+        for worker in rig.state.workers.values_mut() {
+            worker.rates.insert(JobId(1), 16_000.0);
+        }
+        let fleet = measured(&rig.state, JobId(1));
+        let worker = &rig.state.workers[&WorkerId(1)];
+        let size = batch_size(&rig.state, worker, JobId(1), fleet, (queued, 0));
+        assert_eq!(size, expected, "{queued} for {workers}");
+    }
+}
+
 #[test]
 fn each_worker_holds_two_batches_and_no_more() {
     let mut rig = Rig::with(1000, &[]);
