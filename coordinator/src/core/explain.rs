@@ -223,7 +223,11 @@ fn few(facts: &JobFacts) -> String {
 /// Describes at which speed a job runs.
 fn speed(reason: PaceReason, facts: &JobFacts) -> String {
     let left = expected(reason, facts).map_or_else(String::new, |time| {
-        format!("; the evaluation under way needs about {:.1} s more", time.as_secs_f64())
+        let needs = match time.as_secs_f64() {
+            ..0.1 => "less than 0.1".to_owned(),
+            seconds => format!("about {seconds:.1}"),
+        };
+        format!("; the evaluation under way needs {needs} s more")
     });
     let rate = if facts.rate > 0.0 {
         format!("{:.0} realizations per second{left}", facts.rate)

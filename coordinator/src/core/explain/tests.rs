@@ -67,6 +67,8 @@ fn what_runs_runs_at_the_speed_of_its_slots() {
     assert_eq!((told.waiting_s, told.worker), (None, None));
     let idle = JobFacts { rate: 0.0, ..facts() };
     assert_eq!(check(idle, PaceReason::Computing, &["answered lately"]).expected_s, None);
+    let nearly = JobFacts { filled: 990, queued: 0, ..facts() };
+    check(nearly, PaceReason::Computing, &["needs less than 0.1 s more"]);
     // A record that has just been handed to the store delays nothing.
     let storing = JobFacts { standing: Standing::Storing, filled: 1000, queued: 0, ..facts() };
     assert_eq!(check(storing, PaceReason::Computing, &["is being stored"]).expected_s, None);
