@@ -10,7 +10,8 @@ use crate::program;
 /// for the user if its numbers may differ from those of this program.
 ///
 /// # Errors
-/// When it has computed another job: it reads messages of later versions without what it does not know.
+/// When it has computed another job. A coordinator of an earlier version drops the fields of a message that
+/// it does not know.
 pub(crate) fn check(
     submitted: &JobSpecification,
     computed: &JobSpecification,

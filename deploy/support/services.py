@@ -11,7 +11,7 @@ import time
 WAIT_S = 60
 POLL_S = 0.05
 
-# `nohup` has this ignored in all that it starts, and a service ends by it.
+# Under `nohup`, this process and its children ignore SIGHUP, but a test ends a service by it.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 

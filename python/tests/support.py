@@ -16,7 +16,7 @@ from typing import Any
 import osteon
 from osteon import _program
 
-# A shell starts what runs in the background with Ctrl-C ignored; the tests press it.
+# Background processes of a shell ignore SIGINT, but some tests send it to themselves.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).resolve().parent.parent.parent

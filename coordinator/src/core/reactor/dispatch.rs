@@ -33,15 +33,15 @@ mod schedule;
 pub(super) mod sizing;
 pub(super) mod speculation;
 
-/// Number of batches of unknown duration that are sent at once. The others follow with the next events,
-/// answers perhaps among them: then it is known how large a batch should be.
+/// Maximum number of batches of unknown duration that are sent after one event. The other workers get theirs
+/// after the next events. By then some may have answered, and it is known how large a batch should be.
 const UNKNOWN_AT_ONCE: usize = 256;
 
 /// A batch or check that was sent.
 enum Sent {
-    /// It is known about how long it takes, or it is as large as it has to be.
+    /// A check, a batch for a worker on probation, or one whose duration can be estimated.
     Known,
-    /// The first of a worker, while too few others are known to tell how long it will take.
+    /// A batch whose duration is unknown: neither its worker nor enough others have answered.
     Unknown,
 }
 

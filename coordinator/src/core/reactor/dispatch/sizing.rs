@@ -6,7 +6,8 @@
 //! little work, a share is less than that is worth: then fewer workers get batches that keep them busy
 //! for longer. If one worker would take the time R for all that is left and a batch costs c, batches
 //! of √(R c) make the sum of both shortest. Longer ones than c for each worker are not needed for that:
-//! then the coordinator serves one worker after the other before the first is idle again.
+//! then the coordinator serves one worker after the other before the first is idle again. If there are
+//! enough workers for one such batch each, R is the time of the whole evaluation: all batches are equal.
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 

@@ -113,8 +113,8 @@ fn the_rate_of_the_fleet_is_measured_when_the_first_worker_answers() {
     assert_eq!((known.total, known.per_slot), (400.0, 100.0));
 }
 
-/// From the sixteenth on, a worker holds one batch until its speed at the job is known. Places are right
-/// when workers become many and few, which is checked after every event.
+/// While sixteen or more workers are attached, each holds one batch until its speed at the job is known. The
+/// rig checks after every event that the order of service is right, so also when the sixteenth comes or goes.
 #[test]
 fn each_of_many_workers_is_tried_with_one_batch() {
     let mut rig = Rig::with(100_000, &[1; 15]);
@@ -133,8 +133,9 @@ fn each_of_many_workers_is_tried_with_one_batch() {
     assert_eq!([16, 17].map(|worker| held(&rig, worker)), [2; 2]);
 }
 
-/// Of six hundred workers, 256 are tried at once. The others follow with the next events; when eight have
-/// answered, they get batches that are worth what they cost.
+/// As long as no worker has answered, at most 256 batches are sent after an event, although six hundred
+/// workers are free. When eight have answered, the speed of the others is estimated, and they get
+/// larger batches.
 #[test]
 fn a_job_on_many_workers_begins_with_few_batches_of_unknown_duration() {
     let mut rig = Rig::new();
