@@ -94,7 +94,7 @@ impl FleetArguments {
         for &each in &self.each {
             for &workers in &self.workers {
                 let row = Row { workers, slots: self.slots, each, job, disturbance: None };
-                let alone = each.mul_f64(job.expected() as f64 / f64::from(workers * self.slots));
+                let alone = row.ideal(job.expected(), job.chain_max());
                 ensure!(
                     alone <= IDEAL_MAX,
                     "--each: {each:?} on --workers {workers} takes {alone:.0?}, and at most \

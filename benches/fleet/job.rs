@@ -64,13 +64,18 @@ impl Job {
         }
     }
 
+    /// Returns the maximum number of points that it evaluates one after the other.
+    pub(crate) fn chain_max(self) -> u64 {
+        match self {
+            Self::Propagation(_) | Self::Groups(_) => 1,
+            Self::Search { evaluations, .. } => evaluations,
+        }
+    }
+
     /// Returns the number of points of which each must be complete before the next is known, if it
     /// evaluates `points`.
     pub(crate) fn in_a_chain(self, points: u64) -> u64 {
-        match self {
-            Self::Propagation(_) | Self::Groups(_) => 1,
-            Self::Search { .. } => points.max(1),
-        }
+        points.clamp(1, self.chain_max())
     }
 }
 

@@ -94,7 +94,8 @@ impl Bench {
         job: &JobSpecification,
         disturbance: Option<Disturbance>,
     ) -> Result<(Duration, String)> {
-        let limit = 10 * self.row.ideal(self.row.job.expected(), 1) + JOB_LIMIT;
+        let limit =
+            10 * self.row.ideal(self.row.job.expected(), self.row.job.chain_max()) + JOB_LIMIT;
         let half = self.fleet.progress().realizations + self.row.job.expected().div_ceil(2);
         let Self { coordinator, fleet, client, .. } = self;
         let begun = Instant::now();
@@ -140,7 +141,7 @@ async fn disturb(
 impl Row {
     /// Returns the time that so many realizations of `points` points take on all slots, or, if workers are
     /// lost half way, the second half on those that remain.
-    fn ideal(&self, realizations: u64, points: u64) -> Duration {
+    pub(crate) fn ideal(&self, realizations: u64, points: u64) -> Duration {
         let share = match self.disturbance {
             Some(Disturbance::Workers(lost, _)) => {
                 let remaining = f64::from(self.workers - lost) / f64::from(self.workers);
