@@ -9,7 +9,7 @@ mod support;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
@@ -301,6 +301,42 @@ fn a_coordinator_computes_for_many_clients() {
     eventually("the long job runs", || jobs("10000000") == 1);
     drop(stream);
     eventually("the long job is cancelled", || jobs("cancelled") == 1);
+}
+
+/// Beyond the connections that are served some wait for a place, and others are refused at once.
+#[test]
+fn a_crowd_waits_and_others_are_told_to_come_back() {
+    /// As many as src/umbridge/crowd.rs serves, and as many as it lets wait.
+    const EACH: usize = 256;
+    let scratch = Scratch::new();
+    let job = scratch.write("job.toml", &propagation(10));
+    let server = Server::start(&job, &["--workers", "1", "--threads", "1"]);
+    let crowd = |_| {
+        let mut stream = TcpStream::connect(&server.address).unwrap();
+        stream.set_read_timeout(Some(DEADLINE)).unwrap();
+        stream.write_all(b"GET /Info HTTP/1.1\r\nConnection: close\r\n").unwrap();
+        stream
+    };
+    let served: Vec<TcpStream> = (0..EACH).map(crowd).collect();
+    let mut waiting: Vec<TcpStream> = (0..EACH).map(crowd).collect();
+    let began = Instant::now();
+    let refused = server.evaluate("velocity", &[1.0; 6], &json!({}));
+    // It waits for nothing, but the machine may be busy.
+    assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
+    assert_eq!(refused.status, 503, "{refused:?}");
+    assert_eq!(refused.header("retry-after"), Some("10"));
+    assert_eq!(refused.header("content-type"), Some("application/json"));
+    let error = &refused.json()["error"];
+    assert_eq!(error["type"], "InvalidOutput");
+    assert!(error["message"].as_str().unwrap().contains("256 connections"), "{error}");
+    drop(served);
+    for stream in &mut waiting {
+        stream.write_all(b"\r\n").unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 200 "), "{answer}");
+    }
+    assert_eq!(server.evaluate("velocity", &[1.0; 6], &json!({})).status, 200);
 }
 
 #[test]

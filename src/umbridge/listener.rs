@@ -1,24 +1,27 @@
-//! The listener: HTTP/1.1 within bounds on connections, headers and idle time.
+//! The listener: HTTP/1.1 within bounds on connections, headers, idle time and unread answers.
 
+use std::future::ready;
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::Router;
+use axum::http::header::{CONNECTION, HeaderValue};
+use axum::middleware::map_response;
+use axum::response::Response;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use thiserror::Error;
-use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
+use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinSet;
-use tokio::time::sleep;
+use tokio::time::{sleep, timeout};
 
-/// Maximum number of connections at a time, and so of requests; others wait to be accepted.
-const CONNECTIONS_MAX: usize = 256;
-/// Time limit for the header of a request, which also ends idle connections.
-const HEADER_TIMEOUT: Duration = Duration::from_secs(60);
+use super::crowd::{Admission, Crowd, CrowdLimits, LIMITS};
+use super::routes;
+use super::unread::UnreadBounded;
+
 /// Maximum size of the header of a request, bytes.
 const HEADER_BYTES_MAX: usize = 16 * 1024;
 /// Pause after the operating system failed to accept a connection.
@@ -60,32 +63,169 @@ impl ModelListener {
 
     /// Serves until the future is dropped, which closes every connection.
     pub(crate) async fn serve(&self, router: Router) {
-        let places = Arc::new(Semaphore::new(CONNECTIONS_MAX));
+        self.serve_within(LIMITS, router).await;
+    }
+
+    async fn serve_within(&self, limits: CrowdLimits, router: Router) {
+        let service = Arc::new(Service::new(limits, router));
         let mut connections = JoinSet::new();
         loop {
-            let Ok(place) = Arc::clone(&places).acquire_owned().await else {
-                return;
-            };
             match self.listener.accept().await {
                 Ok((stream, _)) => {
-                    // Small answers must not wait for acknowledgements of earlier ones.
-                    let _unsupported = stream.set_nodelay(true);
-                    let service = TowerToHyperService::new(router.clone());
-                    let connection = http1::Builder::new()
-                        .timer(TokioTimer::new())
-                        .header_read_timeout(HEADER_TIMEOUT)
-                        .max_buf_size(HEADER_BYTES_MAX)
-                        .serve_connection(TokioIo::new(stream), service);
-                    connections.spawn(async move {
-                        // Whether a client was slow or has gone makes no difference here.
-                        let _ = connection.await;
-                        drop(place);
-                    });
+                    // Whoever came first is admitted first.
+                    let Some(admission) = service.crowd.admit().await else { return };
+                    connections.spawn(Arc::clone(&service).connection(stream, admission));
                 }
                 // Too many files are open, say.
                 Err(_) => sleep(REFUSED_WAIT).await,
             }
             while connections.try_join_next().is_some() {}
+        }
+    }
+}
+
+/// What all connections share.
+#[derive(Debug)]
+struct Service {
+    limits: CrowdLimits,
+    crowd: Arc<Crowd>,
+    /// The endpoints.
+    router: Router,
+    /// What answers where there is no place.
+    busy: Router,
+}
+
+impl Service {
+    fn new(limits: CrowdLimits, router: Router) -> Self {
+        let crowd = Arc::new(Crowd::new(limits));
+        let others = Arc::clone(&crowd);
+        // While others wait, a connection ends with its request: one that stays open would keep its place
+        // from request to request.
+        let leave = move |mut response: Response| {
+            if others.waits() {
+                response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
+            }
+            ready(response)
+        };
+        let busy = routes::busy(limits.message());
+        Self { limits, crowd, router: router.layer(map_response(leave)), busy }
+    }
+
+    /// Serves a connection, or refuses it.
+    async fn connection(self: Arc<Self>, stream: TcpStream, admission: Admission) {
+        // Small answers must not wait for acknowledgements of earlier ones.
+        let _unsupported = stream.set_nodelay(true);
+        let (_place, served) = match self.crowd.settle(admission).await {
+            Admission::Served(place) => (place, true),
+            Admission::Waits(place) | Admission::Refused(place) => (place, false),
+        };
+        let router = if served { &self.router } else { &self.busy };
+        let connection = http1::Builder::new()
+            .timer(TokioTimer::new())
+            .header_read_timeout(self.limits.header)
+            .max_buf_size(HEADER_BYTES_MAX)
+            .keep_alive(served)
+            .serve_connection(
+                TokioIo::new(UnreadBounded::new(stream)),
+                TowerToHyperService::new(router.clone()),
+            );
+        // Whether a client was slow or has gone makes no difference here.
+        if served {
+            let _ = connection.await;
+        } else {
+            let _ = timeout(self.limits.refusal, connection).await;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use axum::routing::get;
+    use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+
+    use super::*;
+
+    const SHORT: Duration = Duration::from_millis(300);
+
+    /// One connection is served, and another one may wait.
+    const NARROW: CrowdLimits = CrowdLimits { served: 1, waiting: 1, refused: 1, ..LIMITS };
+
+    const REQUEST: &str = "GET / HTTP/1.1\r\nHost: x\r\n\r\n";
+
+    /// Starts a server, and returns its address.
+    async fn start(limits: CrowdLimits) -> SocketAddr {
+        let listener = ModelListener::bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
+        let address = listener.listener.local_addr().unwrap();
+        let router = Router::new().route("/", get(async || "here"));
+        tokio::spawn(async move { listener.serve_within(limits, router).await });
+        address
+    }
+
+    /// Connects and sends something.
+    async fn sent(address: SocketAddr, text: &str) -> TcpStream {
+        let mut stream = TcpStream::connect(address).await.unwrap();
+        stream.write_all(text.as_bytes()).await.unwrap();
+        stream
+    }
+
+    /// Reads one answer, whose body is `here`.
+    async fn answer(stream: &mut TcpStream) -> String {
+        let mut read = Vec::new();
+        while !read.ends_with(b"here") {
+            read.push(stream.read_u8().await.unwrap());
+        }
+        String::from_utf8(read).unwrap().to_lowercase()
+    }
+
+    /// Reads until the connection ends.
+    async fn rest(mut stream: TcpStream) -> String {
+        let mut read = String::new();
+        stream.read_to_string(&mut read).await.unwrap();
+        read
+    }
+
+    #[tokio::test]
+    async fn a_wait_that_is_too_long_ends_with_an_answer() {
+        let address = start(CrowdLimits { wait: SHORT, ..NARROW }).await;
+        let mut served = sent(address, REQUEST).await;
+        answer(&mut served).await;
+        let began = Instant::now();
+        // Its body is read, because a connection that is closed with unread bytes loses its answer.
+        let body = "x".repeat(100_000);
+        let request = format!("POST /Evaluate HTTP/1.1\r\nContent-Length: 100000\r\n\r\n{body}");
+        let refused = rest(sent(address, &request).await).await;
+        assert!(began.elapsed() >= SHORT);
+        assert!(refused.starts_with("HTTP/1.1 503 "), "{refused}");
+        assert!(refused.contains("\r\nretry-after: 10\r\n"), "{refused}");
+        assert!(refused.contains("1 more wait for up to 0.3 s; send fewer"), "{refused}");
+        // Whoever has a place keeps it.
+        served.write_all(REQUEST.as_bytes()).await.unwrap();
+        answer(&mut served).await;
+    }
+
+    #[tokio::test]
+    async fn a_connection_that_stays_open_makes_room() {
+        let address = start(NARROW).await;
+        let mut open = sent(address, REQUEST).await;
+        assert!(!answer(&mut open).await.contains("connection: close"));
+        let mut waiting = sent(address, REQUEST).await;
+        // The third one is refused as soon as the second one waits.
+        assert!(rest(sent(address, REQUEST).await).await.starts_with("HTTP/1.1 503 "));
+        open.write_all(REQUEST.as_bytes()).await.unwrap();
+        assert!(answer(&mut open).await.contains("connection: close"));
+        assert!(!answer(&mut waiting).await.contains("connection: close"));
+    }
+
+    #[tokio::test]
+    async fn who_sends_no_request_loses_the_place() {
+        let address = start(CrowdLimits { header: SHORT, ..NARROW }).await;
+        for begun in ["", "GET / HT", REQUEST] {
+            let silent = sent(address, begun).await;
+            let mut waiting = sent(address, REQUEST).await;
+            answer(&mut waiting).await;
+            drop((silent, waiting));
         }
     }
 }

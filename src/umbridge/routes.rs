@@ -6,7 +6,7 @@ use std::time::Duration;
 use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
-use axum::http::header::{CONTENT_TYPE, HeaderName, HeaderValue};
+use axum::http::header::{CONTENT_TYPE, HeaderName, HeaderValue, RETRY_AFTER};
 use axum::http::{Method, StatusCode, Uri};
 use axum::response::Response;
 use axum::routing::{get, post};
@@ -27,6 +27,11 @@ const PROTOCOL_VERSION: f64 = 1.0;
 const BODY_BYTES_MAX: usize = 1 << 20;
 /// Time limit for the arrival of a request's body, s.
 const BODY_S_MAX: u64 = 30;
+
+/// Time limit for the arrival of the body of a request that is refused, s.
+const REFUSED_BODY_S_MAX: u64 = 5;
+/// Time after which refused clients are asked to come back, s: that of some evaluations.
+const RETRY_AFTER_S: u64 = 10;
 
 /// What a request asks of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,13 +135,26 @@ pub(crate) fn router(served: Arc<ServedJob>) -> Router {
     let mut router = Router::new().route("/", get(front)).route("/Info", get(info));
     for operation in Operation::ALL {
         let answered = move |State(served): State<Arc<ServedJob>>, request: Request| async move {
-            let answer =
-                async { operation.answer(served, &body(request.into_body()).await?).await };
+            let answer = async {
+                operation.answer(served, &body(request.into_body(), BODY_S_MAX).await?).await
+            };
             response(answer.await)
         };
         router = router.route(operation.path(), post(answered));
     }
     router.fallback(unknown).method_not_allowed_fallback(wrong_method).with_state(served)
+}
+
+/// Returns what answers every request while there is no place for its connection.
+pub(super) fn busy(message: String) -> Router {
+    let error = ProtocolError::output(message).with_status(StatusCode::SERVICE_UNAVAILABLE);
+    Router::new().fallback(async move |request: Request| {
+        // Whoever is still sending would not read the answer.
+        let _ = body(request.into_body(), REFUSED_BODY_S_MAX).await;
+        let mut response = response(Err(error));
+        response.headers_mut().insert(RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
+        response
+    })
 }
 
 /// For people, and for clients that only look whether there is a server.
@@ -169,9 +187,9 @@ async fn wrong_method(method: Method, uri: Uri) -> Response {
 }
 
 /// Reads the body of a request, within bounds on size and time.
-async fn body(body: Body) -> Result<Bytes, ProtocolError> {
+async fn body(body: Body, seconds: u64) -> Result<Bytes, ProtocolError> {
     let collected = Limited::new(body, BODY_BYTES_MAX).collect();
-    match timeout(Duration::from_secs(BODY_S_MAX), collected).await {
+    match timeout(Duration::from_secs(seconds), collected).await {
         Ok(Ok(collected)) => Ok(collected.to_bytes()),
         Ok(Err(error)) if error.downcast_ref::<LengthLimitError>().is_some() => {
             let message = format!("the body is longer than {BODY_BYTES_MAX} bytes");
@@ -179,7 +197,7 @@ async fn body(body: Body) -> Result<Bytes, ProtocolError> {
         }
         Ok(Err(error)) => Err(ProtocolError::input(format!("the body cannot be read: {error}"))),
         Err(_) => {
-            let message = format!("the body did not arrive within {BODY_S_MAX} s");
+            let message = format!("the body did not arrive within {seconds} s");
             Err(ProtocolError::input(message).with_status(StatusCode::REQUEST_TIMEOUT))
         }
     }
@@ -204,4 +222,36 @@ fn response(answer: Result<JsonAnswer, ProtocolError>) -> Response {
         }
     }
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::body::HttpBody;
+    use hyper::body::Frame;
+    use tokio::time::Instant;
+
+    use super::*;
+
+    /// A body of which nothing arrives.
+    struct Silent;
+
+    impl HttpBody for Silent {
+        type Data = Bytes;
+        type Error = std::io::Error;
+
+        fn poll_frame(
+            self: std::pin::Pin<&mut Self>,
+            _: &mut std::task::Context<'_>,
+        ) -> std::task::Poll<Option<Result<Frame<Bytes>, Self::Error>>> {
+            std::task::Poll::Pending
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_body_that_does_not_arrive_is_given_up() {
+        let began = Instant::now();
+        let error = body(Body::new(Silent), BODY_S_MAX).await.unwrap_err();
+        assert_eq!(error.status, StatusCode::REQUEST_TIMEOUT);
+        assert_eq!(began.elapsed().as_secs(), BODY_S_MAX);
+    }
 }

@@ -1,0 +1,144 @@
+//! Places for connections: a number of them is served, as many wait for a place, and others are refused
+//! at once.
+//!
+//! Clients of UM-Bridge do not repeat a refused request, and a sampler ends at the first one. So a crowd
+//! that is a little too large has to wait, as evaluations are often short; but nobody waits forever.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::timeout;
+
+/// Bounds on connections.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CrowdLimits {
+    /// Maximum number of connections that are served at a time, and so of requests.
+    pub(super) served: usize,
+    /// Maximum number of connections that wait for a place.
+    pub(super) waiting: usize,
+    /// Maximum number of connections that are being refused without a wait.
+    pub(super) refused: usize,
+    /// Maximum time of a wait for a place.
+    pub(super) wait: Duration,
+    /// Time limit for the header of a request, which also ends idle connections. Together with that of a
+    /// body it is not longer than `wait`, so that who sends nothing keeps nobody out.
+    pub(super) header: Duration,
+    /// Maximum time of a refusal, from the arrival of the request to the end of the connection.
+    pub(super) refusal: Duration,
+}
+
+/// Those of the program: not more than 576 connections, where systems usually allow 1024 files.
+pub(super) const LIMITS: CrowdLimits = CrowdLimits {
+    served: 256,
+    waiting: 256,
+    refused: 64,
+    wait: Duration::from_secs(60),
+    header: Duration::from_secs(30),
+    refusal: Duration::from_secs(10),
+};
+
+/// Who has a place, and who waits for one.
+#[derive(Debug)]
+pub(super) struct Crowd {
+    limits: CrowdLimits,
+    served: Arc<Semaphore>,
+    waiting: Arc<Semaphore>,
+    refused: Arc<Semaphore>,
+}
+
+/// What happens to a new connection. Its permit is kept until the connection has ended.
+#[derive(Debug)]
+pub(super) enum Admission {
+    /// It is served.
+    Served(OwnedSemaphorePermit),
+    /// It may wait until it is served.
+    Waits(OwnedSemaphorePermit),
+    /// It is told to come back later.
+    Refused(OwnedSemaphorePermit),
+}
+
+impl Crowd {
+    pub(super) fn new(limits: CrowdLimits) -> Self {
+        let places = |count| Arc::new(Semaphore::new(count));
+        let [served, waiting, refused] =
+            [limits.served, limits.waiting, limits.refused].map(places);
+        Self { limits, served, waiting, refused }
+    }
+
+    /// Returns what happens to the next connection; `None` if the server is ending. This takes time only
+    /// while as many connections are being refused as may be, of which each soon ends.
+    pub(super) async fn admit(&self) -> Option<Admission> {
+        // A place that becomes free belongs to who waits longest, and is not seen here.
+        let place = |places: &Arc<Semaphore>| Arc::clone(places).try_acquire_owned().ok();
+        if let Some(place) = place(&self.served) {
+            return Some(Admission::Served(place));
+        }
+        if let Some(place) = place(&self.waiting) {
+            return Some(Admission::Waits(place));
+        }
+        Arc::clone(&self.refused).acquire_owned().await.ok().map(Admission::Refused)
+    }
+
+    /// Waits for a place; returns the permit of a connection that is served, or of one that is refused.
+    pub(super) async fn settle(&self, admission: Admission) -> Admission {
+        let Admission::Waits(waiting) = admission else { return admission };
+        let place = Arc::clone(&self.served).acquire_owned();
+        match timeout(self.limits.wait, place).await {
+            Ok(Ok(place)) => Admission::Served(place),
+            _ => Admission::Refused(waiting),
+        }
+    }
+
+    /// Returns whether connections wait for a place.
+    pub(super) fn waits(&self) -> bool {
+        self.waiting.available_permits() < self.limits.waiting
+    }
+}
+
+impl CrowdLimits {
+    /// Returns what refused clients are told.
+    pub(super) fn message(&self) -> String {
+        let Self { served, waiting, wait, .. } = self;
+        format!(
+            "the server is busy: {served} connections are served at a time, and {waiting} more wait for \
+             up to {} s; send fewer requests at a time, or ask again later",
+            wait.as_secs_f64()
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::time::Instant;
+
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_wait_ends_with_a_place_or_in_time() {
+        let crowd = Crowd::new(CrowdLimits { served: 1, waiting: 2, refused: 1, ..LIMITS });
+        let served = crowd.admit().await.unwrap();
+        let [first, second] = [crowd.admit().await.unwrap(), crowd.admit().await.unwrap()];
+        let refused = crowd.admit().await.unwrap();
+        let kinds = [&served, &first, &second, &refused].map(|admission| match admission {
+            Admission::Served(_) => "served",
+            Admission::Waits(_) => "waits",
+            Admission::Refused(_) => "refused",
+        });
+        assert_eq!(kinds, ["served", "waits", "waits", "refused"]);
+        // Whoever comes next is not even refused before the refusal under way has ended.
+        assert!(timeout(Duration::from_secs(3600), crowd.admit()).await.is_err());
+        drop(refused);
+        assert!(matches!(crowd.admit().await, Some(Admission::Refused(_))));
+        drop(served);
+        let first = crowd.settle(first).await;
+        assert!(matches!(first, Admission::Served(_)), "{first:?}");
+        let began = Instant::now();
+        let second = crowd.settle(second).await;
+        assert!(matches!(second, Admission::Refused(_)), "{second:?}");
+        assert_eq!(began.elapsed().as_secs(), LIMITS.wait.as_secs());
+        assert!(crowd.waits());
+        drop(second);
+        assert!(!crowd.waits());
+    }
+}
