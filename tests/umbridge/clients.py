@@ -1,4 +1,5 @@
-"""Uses the models of the server at the URL given, by the Python client of UM-Bridge and by emcee."""
+"""Uses the models of the server at the URL given, by the Python client of UM-Bridge and by emcee, and executes
+the examples of docs/umbridge.md for both."""
 
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -6,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import emcee
 import numpy as np
 import umbridge
+from documented import execute
 from umbridge.emcee import UmbridgeLogProb
 
 URL = sys.argv[1]
@@ -68,6 +70,17 @@ def sampling():
     assert outside(np.full(7, 100.0)) == -1e300
 
 
-for check in (values, derivatives, errors, sampling):
+def documentation():
+    """The examples of the page run."""
+    at = {"http://127.0.0.1:4242": URL}
+    found = execute("import umbridge  # pip install umbridge", at)
+    assert 3000.0 < found["mean"] < 5000.0, found["mean"]
+    assert 0.0 < found["coefficient_of_variation"] < 0.1, found["coefficient_of_variation"]
+    sampler = execute("import emcee", at | {"posterior.ndim), 100)": "posterior.ndim), 2)"})["sampler"]
+    assert sampler.get_chain().shape == (2, 32, 7)
+    assert np.isfinite(sampler.get_log_prob()).all(), sampler.get_log_prob()
+
+
+for check in (values, derivatives, errors, sampling, documentation):
     check()
     print(f"{check.__name__}: ok")

@@ -1,5 +1,6 @@
 """Tests `osteon umbridge` by the conformity suite of UM-Bridge and by its Python clients, which are in
-`upstream/` as they stand in its repository. Uses the standard library only; what it runs, an environment."""
+`upstream/` as they stand in its repository, by emcee and by PyMC. Uses the standard library only; what it runs,
+two environments."""
 
 import argparse
 import os
@@ -11,6 +12,9 @@ HERE = pathlib.Path(__file__).resolve().parent
 UPSTREAM = HERE / "upstream"
 sys.path.insert(0, str(HERE.parent / "python"))
 from environment import check_version, make, run  # noqa: E402
+
+PYMC_OLDEST = (3, 11)
+"""The oldest Python for which there is the PyMC of pymc.txt."""
 
 # Seven free parameters, so that all models are there; few realizations, so that it is quick.
 JOB = """
@@ -38,16 +42,26 @@ def main():
     arguments = parser.parse_args()
     check_version()
     python = make(arguments.work / "venv", HERE / "requirements.txt")
+    with_pymc = None
+    if sys.version_info >= PYMC_OLDEST:
+        with_pymc = make(arguments.work / "venv-pymc", HERE / "pymc.txt")
+    else:
+        print("PyMC is not tested: it needs Python 3.11 or later")
     job = arguments.work / "job.toml"
     job.write_text(JOB)
     variables = {name: value for name, value in os.environ.items() if name != "OSTEON_COORDINATOR"}
     # The tests stay on this machine.
     variables |= {"no_proxy": "127.0.0.1", "PYTHONDONTWRITEBYTECODE": "1"}
+    # PyMC compiles nothing in C, for which there may be no compiler, and keeps its files below ours.
+    compiled = arguments.work.resolve() / "pytensor"
+    variables |= {"PYTENSOR_FLAGS": f"cxx=,base_compiledir={compiled}", "MPLBACKEND": "agg"}
     command = [arguments.osteon.resolve(), "umbridge", job, "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=variables) as server:
         try:
             url = server.stdout.readline().strip()
             check(python, url, variables)
+            if with_pymc:
+                run([with_pymc, HERE / "sampling_by_pymc.py", url], HERE, variables)
         finally:
             server.terminate()
     if server.returncode != 0:
