@@ -91,7 +91,7 @@ mod tests {
         let of = |decays: Option<[f64; 3]>| {
             let mut digest = PathDigest::new();
             let outcomes = Outcomes::from(FIRST_OUTCOMES);
-            digest.add(&FIRST, &outcomes.with_decays(decays.map(|decays| decays.into())));
+            digest.add(&FIRST, &outcomes.with_decays(decays.map(|decays| decays.to_vec())));
             digest.finish()
         };
         let mut digest = PathDigest::new();

@@ -13,13 +13,73 @@ pub fn quantile(ascending: &[f64], p: f64) -> Option<f64> {
 
 /// Returns median and largest of the estimated errors of a set, in any order; `None` if there are
 /// none.
-pub fn estimated_error(mut errors: Vec<f64>) -> Option<EstimatedError> {
-    let largest = errors.iter().copied().max_by(f64::total_cmp)?;
-    let (below, fraction) = place(errors.len() - 1, 0.5);
-    // The others need no order: there may be millions of them.
-    let (_, &mut low, above) = errors.select_nth_unstable_by(below, f64::total_cmp);
+pub fn estimated_error(errors: impl Iterator<Item = f64> + Clone) -> Option<EstimatedError> {
+    let is_small = errors.size_hint().1.is_some_and(|most| most <= SMALL_MAX);
+    let sifted = if is_small { Sifted::all(errors) } else { Sifted::around_median(errors) };
+    let Sifted { mut numbers, before, count, largest } = sifted?;
+    let (below, fraction) = place(count - 1, 0.5);
+    let (_, &mut low, above) = numbers.select_nth_unstable_by(below - before, f64::total_cmp);
     let high = above.iter().copied().min_by(f64::total_cmp).unwrap_or(low);
     Some(EstimatedError { median: between(low, high, fraction), largest })
+}
+
+/// Size up to which a set is copied to find its median.
+const SMALL_MAX: usize = 1 << 16;
+/// First bits of a number that select its bin: sign, exponent and the first of the fraction.
+const BIN_BITS: u32 = 16;
+
+/// The part of a set with the one or two numbers in its middle. The others need no place: there may be
+/// millions of them.
+struct Sifted {
+    /// In any order.
+    numbers: Vec<f64>,
+    /// Number of smaller ones.
+    before: usize,
+    /// Size of the set.
+    count: usize,
+    /// Largest number of the set.
+    largest: f64,
+}
+
+impl Sifted {
+    fn all(numbers: impl Iterator<Item = f64>) -> Option<Self> {
+        let numbers: Vec<f64> = numbers.collect();
+        let largest = numbers.iter().copied().max_by(f64::total_cmp)?;
+        Some(Self { before: 0, count: numbers.len(), largest, numbers })
+    }
+
+    fn around_median(numbers: impl Iterator<Item = f64> + Clone) -> Option<Self> {
+        let mut counts = vec![0_usize; 1 << BIN_BITS];
+        let count_in_bin = |number: &f64| counts[bin(*number)] += 1;
+        let largest = numbers.clone().inspect(count_in_bin).max_by(f64::total_cmp)?;
+        let count = counts.iter().sum();
+        let (below, _) = place(count - 1, 0.5);
+        let (first, before) = bin_of(&counts, below);
+        let (last, _) = bin_of(&counts, (below + 1).min(count - 1));
+        let numbers = numbers.filter(|number| (first..=last).contains(&bin(*number))).collect();
+        Some(Self { numbers, before, count, largest })
+    }
+}
+
+/// Returns the bin of a number: a larger one is in the same bin or in a later one.
+fn bin(number: f64) -> usize {
+    let bits = number.to_bits();
+    // Negative numbers descend with their bits.
+    let ascending = if number.is_sign_negative() { !bits } else { bits | 1 << 63 };
+    (ascending >> (u64::BITS - BIN_BITS)) as usize
+}
+
+/// Returns the bin of the number with this index in ascending order, and the number of numbers in
+/// earlier bins.
+fn bin_of(counts: &[usize], index: usize) -> (usize, usize) {
+    let mut before = 0;
+    for (bin, count) in counts.iter().enumerate() {
+        if before + count > index {
+            return (bin, before);
+        }
+        before += count;
+    }
+    (counts.len(), before)
 }
 
 /// Returns the index below the quantile of probability `p`, given the last index, and how far the
@@ -63,19 +123,40 @@ mod tests {
     fn errors_need_no_order() {
         let expected = Some(EstimatedError { median: 2.5e-5, largest: 4e-4 });
         for errors in [vec![4e-4, 1e-5, 2e-5, 3e-5], vec![1e-5, 2e-5, 3e-5, 4e-4]] {
-            let found = estimated_error(errors);
+            let found = estimated_error(errors.into_iter());
             assert_eq!(found, expected);
         }
-        assert_eq!(estimated_error(vec![]), None);
+        assert_eq!(estimated_error([].into_iter()), None);
         // The same bits as from a sorted list, whatever the count.
         for count in 1..40_u32 {
             let errors: Vec<f64> =
                 (0..count).map(|i| 1e-5 * f64::from(i * 37 % 41) / f64::from(1 + i % 3)).collect();
             let mut sorted = errors.clone();
             sorted.sort_by(f64::total_cmp);
-            let found = estimated_error(errors).unwrap();
             let expected = [quantile(&sorted, 0.5).unwrap(), sorted[sorted.len() - 1]];
+            let all = errors.iter().copied();
+            let found = estimated_error(all).unwrap();
             assert_eq!([found.median, found.largest].map(f64::to_bits), expected.map(f64::to_bits));
+        }
+    }
+
+    #[test]
+    fn the_median_of_many_is_that_of_a_sorted_list() {
+        let number = |i: usize| 1e-5 * (i * 7919 % 100_003) as f64 / (1 + i % 3) as f64;
+        let constant = |_: usize| 2e-5;
+        // Two halves far apart: the two numbers in the middle are in different bins.
+        let halves = |i: usize| if i.is_multiple_of(2) { 1e-7 } else { 0.5 };
+        let signed = |i: usize| number(i) - 0.1;
+        let kinds: [&dyn Fn(usize) -> f64; 4] = [&number, &constant, &halves, &signed];
+        for (kind, of) in kinds.iter().enumerate() {
+            for count in [SMALL_MAX - 1, SMALL_MAX + 1, SMALL_MAX + 2] {
+                let mut sorted: Vec<f64> = (0..count).map(of).collect();
+                let found = estimated_error(sorted.clone().into_iter()).unwrap();
+                sorted.sort_by(f64::total_cmp);
+                let expected = [quantile(&sorted, 0.5).unwrap(), sorted[count - 1]];
+                let found = [found.median, found.largest];
+                assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits), "{kind} {count}");
+            }
         }
     }
 }

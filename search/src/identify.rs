@@ -153,7 +153,7 @@ pub fn identify<E>(
                 let with_decays = specification.has_decays();
                 let outcomes = Outcomes::of_results(solved.iter().copied(), with_decays);
                 let successes = solved.iter().filter(|one| one.outcome.is_ok());
-                let errors = successes.map(|one| one.estimated_error).collect();
+                let errors = successes.map(|one| one.estimated_error);
                 search.tell(outcomes.clone(), quantile::estimated_error(errors));
                 best.keep(&search, outcomes);
             }

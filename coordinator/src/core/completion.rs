@@ -5,9 +5,6 @@
 //! ([`Effect::Complete`](crate::core::effect::Effect::Complete)), and gets back first a record, which is
 //! stored meanwhile, and then the search.
 
-use std::panic::resume_unwind;
-use std::thread;
-
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::JobId;
 use crate::store::EvaluationRecord;
@@ -50,14 +47,7 @@ impl Completion {
         let Self { job, evaluation, search: mut after } = self;
         let attempt = evaluation.attempt;
         let with_decays = after.has_decays();
-        let (outcomes, estimated_error) = thread::scope(|scope| {
-            let errors = scope.spawn(|| evaluation.estimated_error());
-            (
-                evaluation.outcomes(with_decays),
-                errors.join().unwrap_or_else(|panic| resume_unwind(panic)),
-            )
-        });
-        let outcomes = outcomes?;
+        let (outcomes, estimated_error) = evaluation.complete(with_decays)?;
         let is_last = evaluation.diverges_from_store(&outcomes);
         let (number, point) = (evaluation.number, evaluation.point);
         let workers = evaluation.workers.iter().cloned().collect();

@@ -3,16 +3,19 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
-use osteon_common::outcome::{FailureKind, Outcome, RealizationResult, encode};
+use osteon_common::outcome::{Outcome, RealizationResult, encode};
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
-use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
 
+use self::results::Results;
 use crate::core::crashes::{Crashes, LostWorker};
 use crate::core::dispute::{self, Dispute, Vote};
 use crate::core::indices::Indices;
 use crate::core::worker_name::WorkerName;
+use crate::store::PartPiece;
+
+mod results;
 
 /// A batch that is to be computed a second time by another worker.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,11 +53,8 @@ pub struct PendingEvaluation {
     pub(crate) stored: StoredRecord,
     /// Number of realizations.
     realizations: u64,
-    /// Result of each index, up to the last one that has been filled: a large evaluation is not set up
-    /// at once.
-    pub(crate) results: Vec<Option<RealizationResult>>,
-    /// Number of results that are filled.
-    pub(crate) filled: u64,
+    /// The results so far. Their owners are positions in `workers`.
+    pub(crate) results: Results,
     /// Indices to be sent, from the front.
     pub(crate) queue: VecDeque<Indices>,
     /// Indices that were alone in a batch of a lost worker, with the workers that were lost while
@@ -64,9 +64,6 @@ pub struct PendingEvaluation {
     pub(crate) quarantine: VecDeque<u64>,
     /// All workers whose answers are among the results.
     pub(crate) workers: Vec<WorkerName>,
-    /// Position in `workers` of the worker that gave each result; meaningless while the result is
-    /// empty.
-    owners: Vec<u32>,
     /// Audits that have not been sent yet.
     pub(crate) audits: VecDeque<Audit>,
     /// Number of audits that are being computed.
@@ -92,13 +89,11 @@ impl PendingEvaluation {
             point,
             stored: StoredRecord::Missing,
             realizations,
-            results: Vec::with_capacity(length),
-            filled: 0,
+            results: Results::with_room_for(length),
             queue: VecDeque::from([Indices { first: 0, count: realizations }]),
             crashes: BTreeMap::new(),
             quarantine: VecDeque::new(),
             workers: Vec::new(),
-            owners: Vec::with_capacity(length),
             audits: VecDeque::new(),
             audits_out: 0,
             disputes: Vec::new(),
@@ -110,7 +105,7 @@ impl PendingEvaluation {
 
     /// Queues exactly the indices that are not filled: nothing of it has been sent yet.
     pub(crate) fn queue_unfilled(&mut self) {
-        self.queue = runs(&self.results, Option::is_none).into();
+        self.queue = self.results.runs(false).into();
         let first = self.results.len() as u64;
         if first < self.realizations {
             self.queue.push_back(Indices { first, count: self.realizations - first });
@@ -119,7 +114,7 @@ impl PendingEvaluation {
 
     /// Counts all results as not saved.
     pub(crate) fn save_again(&mut self) {
-        self.unsaved = runs(&self.results, Option::is_some);
+        self.unsaved = self.results.runs(true);
     }
 
     /// Returns the number of realizations.
@@ -129,7 +124,7 @@ impl PendingEvaluation {
 
     /// Returns the number of realizations that have an outcome.
     pub fn filled(&self) -> u64 {
-        self.filled
+        self.results.filled()
     }
 
     /// Returns the number of realizations that wait to be sent, without the quarantined ones.
@@ -196,26 +191,16 @@ impl PendingEvaluation {
             self.workers.push(by.clone());
             self.workers.len() - 1
         });
-        let owner = u32::try_from(place).unwrap_or(u32::MAX);
         match self.unsaved.last_mut() {
             Some(last) if last.end() == indices.first => last.count += indices.count,
             _ => self.unsaved.push(indices),
         }
-        let first = usize::try_from(indices.first).unwrap_or(usize::MAX);
-        let end = usize::try_from(indices.end().min(self.realizations)).unwrap_or(usize::MAX);
-        if self.results.len() < end {
-            self.results.resize(end, None);
-            self.owners.resize(end, 0);
-        }
-        let results = self.results.get_mut(first..).unwrap_or_default();
-        let owners = self.owners.get_mut(first..).unwrap_or_default();
-        for ((result, owned), solved) in results.iter_mut().zip(owners).zip(solved) {
-            if result.is_none() {
-                *result = Some(*solved);
-                *owned = owner;
-                self.filled += 1;
-            }
-        }
+        let end = indices.end().min(self.realizations);
+        let place_of = |index: u64| usize::try_from(index).unwrap_or(usize::MAX);
+        let (first, most) = (place_of(indices.first), place_of(end.saturating_sub(indices.first)));
+        let solved = solved.get(..most).unwrap_or(solved);
+        // There are fewer workers than numbers.
+        self.results.fill(first, solved, u32::try_from(place).unwrap_or(u32::MAX - 1));
     }
 
     /// Compares an answer of `by` with the results of `indices`. Returns the difference, from the
@@ -228,56 +213,46 @@ impl PendingEvaluation {
         by: &WorkerName,
     ) -> Option<(Indices, [Vote; 2])> {
         let first = usize::try_from(indices.first).ok()?;
-        let results = self.results.get(first..)?;
-        let differs = |(result, later): (&Option<RealizationResult>, &RealizationResult)| {
-            result.is_some_and(|earlier| !dispute::same(earlier, *later))
+        let differs = |(place, later): (usize, &RealizationResult)| {
+            let earlier = self.results.get(first + place);
+            earlier.is_some_and(|earlier| !dispute::same(earlier, *later))
         };
-        let at = results.iter().zip(solved).position(differs)?;
-        let owner = self.owners.get(first + at)?;
-        let whose = self.owners.get(first + at..)?.iter().zip(results.get(at..)?);
-        let run = whose.take_while(|(of, _)| *of == owner).map_while(|(_, result)| *result);
-        let earlier: Vec<RealizationResult> = run.take(solved.len() - at).collect();
-        let later = solved.get(at..at + earlier.len())?.to_vec();
-        let indices = Indices { first: indices.first + at as u64, count: earlier.len() as u64 };
-        let owner = self.workers.get(usize::try_from(*owner).ok()?)?.clone();
+        let at = solved.iter().enumerate().position(differs)?;
+        let owner = self.owner(indices.first + at as u64)?;
+        let count = self.results.of_same_owner(first + at, solved.len() - at);
+        let places = first + at..first + at + count;
+        let earlier = places.filter_map(|place| self.results.get(place)).collect();
+        let later = solved.get(at..at + count)?.to_vec();
+        let indices = Indices { first: indices.first + at as u64, count: count as u64 };
         let later = Vote { by: by.clone(), solved: later };
         Some((indices, [Vote { by: owner, solved: earlier }, later]))
     }
 
     /// Returns the worker that filled the result of an index.
     pub(crate) fn owner(&self, index: u64) -> Option<WorkerName> {
-        let owner = self.owners.get(usize::try_from(index).ok()?)?;
-        self.workers.get(usize::try_from(*owner).ok()?).cloned()
+        let owner = self.results.owner(usize::try_from(index).ok()?)?;
+        self.workers.get(usize::try_from(owner).ok()?).cloned()
     }
 
-    /// Passes the filled results of `indices` to `visit`, in runs of at most `most` of the same worker:
-    /// the first index, the worker, and the results, none of which is empty.
-    pub(crate) fn visit_runs(
-        &self,
-        indices: Indices,
-        most: usize,
-        mut visit: impl FnMut(u64, &WorkerName, &[Option<RealizationResult>]),
-    ) {
+    /// Returns the results of `indices` that are filled, in pieces of at most `most` of the same worker.
+    pub(crate) fn pieces(&self, indices: Indices, most: usize) -> Vec<PartPiece> {
         let end = usize::try_from(indices.end()).unwrap_or(usize::MAX).min(self.results.len());
         let mut first = usize::try_from(indices.first).unwrap_or(usize::MAX);
-        while let Some(rest) = self.results.get(first..end).filter(|rest| !rest.is_empty()) {
-            let owners = self.owners.get(first..end).unwrap_or_default();
-            let owner = owners.first().copied();
-            let same = |(result, of): &(&Option<RealizationResult>, &u32)| {
-                result.is_some() && Some(**of) == owner
-            };
-            let count = rest.iter().zip(owners).take(most).take_while(same).count();
-            let by = owner.and_then(|owner| self.workers.get(usize::try_from(owner).ok()?));
-            if let Some(by) = by.filter(|_| count > 0) {
-                visit(first as u64, by, &rest[..count]);
+        let mut pieces = Vec::new();
+        while first < end {
+            let count = self.results.of_same_owner(first, most.min(end - first));
+            let results = (first..first + count).filter_map(|place| self.results.get(place));
+            if let Some(by) = self.owner(first as u64) {
+                pieces.push(PartPiece { first: first as u64, by, results: results.collect() });
             }
             first += count.max(1);
         }
+        pieces
     }
 
     /// Returns whether every index has an outcome and no check of them is pending.
     pub(crate) fn is_settled(&self) -> bool {
-        self.filled >= self.realizations
+        self.filled() >= self.realizations
             && self.audits.is_empty()
             && self.audits_out == 0
             && self.disputes.is_empty()
@@ -311,37 +286,11 @@ impl PendingEvaluation {
 
     /// Returns all outcomes in index order, `with_decays` or without, once it is settled.
     pub(crate) fn outcomes(&self, with_decays: bool) -> Option<Outcomes> {
-        if !self.is_settled() || self.results.iter().any(Option::is_none) {
-            return None;
-        }
-        // None is empty. With a known length they are written to their place at once.
-        let empty = RealizationResult::failed(FailureKind::NotFinite);
-        let results = self.results.iter().map(|result| result.unwrap_or(empty));
-        Some(Outcomes::of_results(results, with_decays))
+        self.is_settled().then(|| self.results.outcomes(self.realizations, with_decays)).flatten()
     }
 
     /// Returns the estimated errors of the successes so far.
     pub(crate) fn estimated_error(&self) -> Option<EstimatedError> {
-        let mut errors = Vec::with_capacity(self.results.len());
-        let successes = self.results.iter().flatten().filter(|solved| solved.outcome.is_ok());
-        errors.extend(successes.map(|solved| solved.estimated_error));
-        quantile::estimated_error(errors)
+        self.results.estimated_error()
     }
-}
-
-/// Returns the runs of consecutive indices whose results satisfy `of`.
-fn runs(
-    results: &[Option<RealizationResult>],
-    of: impl Fn(&Option<RealizationResult>) -> bool,
-) -> Vec<Indices> {
-    let mut found = Vec::new();
-    let mut first = 0;
-    for run in results.chunk_by(|one, other| of(one) == of(other)) {
-        let count = run.len() as u64;
-        if run.first().is_some_and(&of) {
-            found.push(Indices { first, count });
-        }
-        first += count;
-    }
-    found
 }

@@ -303,10 +303,10 @@ fn check_evaluation(
     job: JobId,
     evaluation: &PendingEvaluation,
 ) -> Result<(), Inconsistency> {
+    let realizations = usize::try_from(evaluation.realizations()).unwrap_or(usize::MAX);
     let mut places: Vec<u32> =
-        evaluation.results.iter().map(|result| u32::from(result.is_some())).collect();
-    places.resize(usize::try_from(evaluation.realizations()).unwrap_or(usize::MAX), 0);
-    if places.iter().map(|place| u64::from(*place)).sum::<u64>() != evaluation.filled {
+        (0..realizations).map(|index| u32::from(evaluation.results.get(index).is_some())).collect();
+    if places.iter().map(|place| u64::from(*place)).sum::<u64>() != evaluation.filled() {
         return Err(Inconsistency::Filled(job));
     }
     let queued = evaluation.queue.iter().map(|indices| (indices.first, indices.count));

@@ -93,10 +93,7 @@ pub(crate) fn take_unsaved(
     }
     let mut pieces = Vec::new();
     for indices in take_first(&mut evaluation.unsaved, most) {
-        evaluation.visit_runs(indices, PIECE_MAX, |first, by, run| {
-            let results = run.iter().copied().flatten().collect();
-            pieces.push(PartPiece { first, by: by.clone(), results });
-        });
+        pieces.extend(evaluation.pieces(indices, PIECE_MAX));
     }
     let point = evaluation.point;
     (!pieces.is_empty()).then_some(PartRecord { job, point, pieces })

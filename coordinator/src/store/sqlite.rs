@@ -27,6 +27,7 @@ use crate::core::worker_name::WorkerName;
 mod acknowledged;
 mod backup;
 mod columns;
+mod evaluation_rows;
 mod group;
 mod job_row;
 mod log;
@@ -38,10 +39,7 @@ mod summary;
 
 pub use acknowledged::LostJobs;
 use acknowledged::{LAST_DELETED_JOB, Mark, last_known, never_again};
-use columns::{
-    JobColumns, ban_checksum, end_checksum, evaluation, evaluation_checksum, job_checksum,
-    nanoseconds, pack_errors, pack_outcomes, pack_point, pack_workers,
-};
+use columns::{JobColumns, ban_checksum, end_checksum, job_checksum, nanoseconds, pack_workers};
 use job_row::{damaged_end, job_columns, job_record};
 use log::Log;
 use parts::StaleParts;
@@ -270,14 +268,11 @@ impl Store for &SqliteStore {
         job: JobId,
         number: u64,
     ) -> Result<Option<EvaluationRecord>, StoreError> {
-        let sql = "SELECT number, point, outcomes, checksum, estimated_error, workers
-                   FROM evaluation WHERE job = ?1 AND number = ?2";
-        let read = |row: &Row<'_>| evaluation(job, row);
-        let found = self.connection.query_row(sql, params![job.0, number], read).optional();
+        let found = evaluation_rows::get(&self.connection, job, number);
         match found.map_err(|source| self.refused(source))? {
+            Some(None) => Err(self.damaged(job, DamagedRecord::Evaluation(number))),
+            Some(record) => Ok(record),
             None => Ok(None),
-            Some((_, Some(record))) => Ok(Some(record)),
-            Some((_, None)) => Err(self.damaged(job, DamagedRecord::Evaluation(number))),
         }
     }
 
@@ -330,17 +325,9 @@ impl Store for &SqliteStore {
         record: &EvaluationRecord,
         is_last: bool,
     ) -> Result<(), StoreError> {
-        let point = pack_point(record.point);
-        let outcomes = pack_outcomes(&record.outcomes);
-        let errors = record.estimated_error.map(pack_errors);
-        let (job, number, workers) = (record.job, record.number, pack_workers(&record.workers));
-        let checksum =
-            evaluation_checksum(job, number, &point, &outcomes, errors.as_deref(), &workers);
-        let sql = "INSERT OR REPLACE INTO evaluation (job, number, point, outcomes, checksum,
-                   estimated_error, workers) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
-        let values = params![job.0, number, &point, outcomes, checksum, errors, workers];
+        let (job, number) = (record.job, record.number);
         self.change(|connection| {
-            connection.execute(sql, values)?;
+            let point = evaluation_rows::put(connection, record)?;
             self.stale.borrow_mut().add_at(connection, job, &point)?;
             if is_last {
                 let sql = "DELETE FROM evaluation WHERE job = ?1 AND number > ?2";

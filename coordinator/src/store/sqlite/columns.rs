@@ -3,41 +3,17 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use osteon_common::outcome::{decode, encode};
-use osteon_common::outcomes::Outcomes;
+use osteon_common::outcome::{Outcome, decode, encode};
 use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Point};
 use osteon_common::results::EstimatedError;
 use osteon_common::version::Program;
-use rusqlite::Row;
 
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
-use crate::store::{BanRecord, EndRecord, EvaluationRecord};
+use crate::store::{BanRecord, EndRecord};
 
 /// Size of an outcome in a blob, bytes: its code, and its velocity as little-endian f64.
 const OUTCOME_BYTES: usize = 9;
-
-/// Returns the evaluation of a row, and its number; `None` if it is damaged.
-pub(super) fn evaluation(
-    job: JobId,
-    row: &Row<'_>,
-) -> rusqlite::Result<(u64, Option<EvaluationRecord>)> {
-    let (number, checksum): (u64, Vec<u8>) = (row.get(0)?, row.get(3)?);
-    let (point, outcomes) = (row.get_ref(1)?.as_blob()?, row.get_ref(2)?.as_blob()?);
-    let errors = row.get_ref(4)?.as_blob_or_null()?;
-    let workers = row.get_ref(5)?.as_str()?;
-    let intact = checksum == evaluation_checksum(job, number, point, outcomes, errors, workers);
-    let unpacked = || {
-        let (point, outcomes) = unpack(point).zip(unpack_outcomes(outcomes))?;
-        let estimated_error = match errors {
-            Some(packed) => Some(unpack_errors(packed)?),
-            None => None,
-        };
-        let workers = unpack_workers(workers)?;
-        Some(EvaluationRecord { job, number, point, outcomes, estimated_error, workers })
-    };
-    Ok((number, intact.then(unpacked).flatten()))
-}
 
 /// Returns nanoseconds as stored: SQLite has only signed integers.
 pub(super) fn nanoseconds(time: Duration) -> u64 {
@@ -78,23 +54,20 @@ pub(super) fn ban_checksum(record: &BanRecord) -> Vec<u8> {
     checksum(&fields)
 }
 
-/// Returns the checksum of an evaluation. Absent estimated errors are an empty field.
+/// Returns the checksum of an evaluation, which covers those of its pieces. Absent estimated errors are
+/// an empty field; without pieces there is no field for them.
 pub(super) fn evaluation_checksum(
-    job: JobId,
-    number: u64,
+    (job, number): (JobId, u64),
     point: &[u8],
-    outcomes: &[u8],
+    (outcomes, pieces): (&[u8], &[u8]),
     errors: Option<&[u8]>,
     workers: &str,
 ) -> Vec<u8> {
-    checksum(&[
-        &job.0.to_le_bytes(),
-        &number.to_le_bytes(),
-        point,
-        outcomes,
-        errors.unwrap_or_default(),
-        workers.as_bytes(),
-    ])
+    let (job, number) = (job.0.to_le_bytes(), number.to_le_bytes());
+    let errors = errors.unwrap_or_default();
+    let fields: [&[u8]; 7] = [&job, &number, point, outcomes, errors, workers.as_bytes(), pieces];
+    let without_pieces = fields.len() - 1;
+    checksum(if pieces.is_empty() { &fields[..without_pieces] } else { &fields })
 }
 
 pub(super) fn end_checksum(end: &EndRecord) -> Vec<u8> {
@@ -136,14 +109,15 @@ pub(super) fn checksum(fields: &[&[u8]]) -> Vec<u8> {
 const DECAYS_FOLLOW: u8 = 0xFF;
 
 /// Packs outcomes, one record after the other; with decays, as [`with_decays`] says.
-pub(super) fn pack_outcomes(outcomes: &Outcomes) -> Vec<u8> {
-    let mut packed = Vec::with_capacity(outcomes.len() * OUTCOME_BYTES);
-    for &outcome in outcomes.iter() {
+pub(super) fn pack_outcomes(outcomes: &[Outcome], decays: Option<&[f64]>) -> Vec<u8> {
+    let mut packed = vec![0; outcomes.len() * OUTCOME_BYTES];
+    let (records, _) = packed.as_chunks_mut::<OUTCOME_BYTES>();
+    for (record, &outcome) in records.iter_mut().zip(outcomes) {
         let (code, velocity) = encode(outcome);
-        packed.push(code);
-        packed.extend(velocity.to_le_bytes());
+        record[0] = code;
+        record[1..].copy_from_slice(&velocity.to_le_bytes());
     }
-    with_decays(packed, outcomes.decays())
+    with_decays(packed, decays)
 }
 
 /// Returns a blob of records followed by the decays of all of them as little-endian f64, with a byte
@@ -171,34 +145,31 @@ pub(super) fn without_decays<const RECORD: usize>(
     whole.then(|| (records, Some(decays.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())))
 }
 
-fn unpack_outcomes(packed: &[u8]) -> Option<Outcomes> {
+/// Returns outcomes, and their decays if they have any; `None` if they are damaged.
+pub(super) fn unpack_outcomes(packed: &[u8]) -> Option<(Vec<Outcome>, Option<Vec<f64>>)> {
     let (packed, decays) = without_decays::<OUTCOME_BYTES>(packed)?;
     let (records, rest) = packed.as_chunks::<OUTCOME_BYTES>();
     if !rest.is_empty() {
         return None;
     }
     // With room for all of them: there may be millions.
-    let mut unpacked = Vec::with_capacity(records.len());
+    let mut outcomes = Vec::with_capacity(records.len());
     for [code, velocity @ ..] in records {
-        unpacked.push(decode(*code, f64::from_le_bytes(*velocity))?);
+        outcomes.push(decode(*code, f64::from_le_bytes(*velocity))?);
     }
-    let outcomes = Outcomes::from(unpacked);
-    let fits = |outcomes: &Outcomes, decays: &[f64]| {
-        let pairs = outcomes.iter().zip(decays);
-        pairs.into_iter().all(|(outcome, decay)| match outcome {
-            Ok(_) => decay.is_finite(),
-            Err(_) => decay.to_bits() == 0,
-        })
+    let fits = |(outcome, decay): (&Outcome, &f64)| match outcome {
+        Ok(_) => decay.is_finite(),
+        Err(_) => decay.to_bits() == 0,
     };
-    let consistent = decays.as_ref().is_none_or(|decays| fits(&outcomes, decays));
-    consistent.then(|| outcomes.with_decays(decays.map(Into::into)))
+    let consistent = outcomes.iter().zip(decays.iter().flatten()).all(fits);
+    consistent.then_some((outcomes, decays))
 }
 
 pub(super) fn pack_errors(errors: EstimatedError) -> Vec<u8> {
     [errors.median, errors.largest].into_iter().flat_map(f64::to_le_bytes).collect()
 }
 
-fn unpack_errors(packed: &[u8]) -> Option<EstimatedError> {
+pub(super) fn unpack_errors(packed: &[u8]) -> Option<EstimatedError> {
     let (values, rest) = packed.as_chunks::<8>();
     let &[median, largest] = values else { return None };
     let (median, largest) = (f64::from_le_bytes(median), f64::from_le_bytes(largest));
@@ -239,6 +210,6 @@ pub(super) fn unpack_worker(line: &str) -> Option<WorkerName> {
     Some(WorkerName::new(host, process.parse().ok()?, instance))
 }
 
-fn unpack_workers(packed: &str) -> Option<BTreeSet<WorkerName>> {
+pub(super) fn unpack_workers(packed: &str) -> Option<BTreeSet<WorkerName>> {
     packed.split('\n').filter(|line| !line.is_empty()).map(unpack_worker).collect()
 }

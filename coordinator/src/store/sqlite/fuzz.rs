@@ -5,6 +5,7 @@
 use osteon_fuzz::{CASES, bounded, bytes, check, damaged, here};
 use osteon_proto::{results, v1};
 
+use super::columns::{evaluation_checksum, pack_errors, pack_outcomes, pack_point};
 use super::summary::summary_checksum;
 use super::tests::{end, evaluation, job, summary};
 use super::*;
@@ -37,7 +38,7 @@ fn accepted<T>(read: Result<Option<T>, StoreError>) -> Option<T> {
 /// Writes `damage` into one column of an evaluation and reads it.
 fn check_evaluation(store: &mut SqliteStore, column: usize, damage: &[u8]) {
     let whole = evaluation(1, 2);
-    let (point, outcomes) = (pack_point(whole.point), pack_outcomes(&whole.outcomes));
+    let (point, outcomes) = (pack_point(whole.point), pack_outcomes(&whole.outcomes, None));
     let errors = whole.estimated_error.map(pack_errors).unwrap_or_default();
     let workers = pack_workers(&whole.workers).into_bytes();
     let mut columns = [point, outcomes, errors, workers];
@@ -45,7 +46,7 @@ fn check_evaluation(store: &mut SqliteStore, column: usize, damage: &[u8]) {
     let [point, outcomes, errors, workers] = &columns;
     // A column of text that is not valid UTF-8 is replaced for the checksum.
     let text = std::str::from_utf8(workers).unwrap_or_default();
-    let checksum = evaluation_checksum(JOB, 2, point, outcomes, Some(errors), text);
+    let checksum = evaluation_checksum((JOB, 2), point, (outcomes, &[]), Some(errors), text);
     let sql = "UPDATE evaluation SET point = ?1, outcomes = ?2, estimated_error = ?3,
                workers = CAST(?4 AS TEXT), checksum = ?5 WHERE job = 1 AND number = 2";
     let values = params![point, outcomes, errors, workers, checksum];

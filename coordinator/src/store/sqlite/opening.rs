@@ -12,12 +12,15 @@ use osteon_proto::identity::host_name;
 use rusqlite::config::DbConfig;
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
-use super::parts;
 use super::schema::SCHEMA;
+use super::{evaluation_rows, parts};
 use crate::store::StoreError;
 
-/// The only format that this program reads and writes.
-pub(super) const FORMAT: i64 = 7;
+/// The format that this program writes.
+pub(super) const FORMAT: i64 = 8;
+/// The format before it, in which an evaluation has no pieces. A file of it becomes one of the format
+/// that is written.
+pub(super) const FORMER: i64 = 7;
 /// Name of the file in the store's directory.
 pub(super) const FILE: &str = "osteon.sqlite";
 /// Name of the lock file, which names the process that has the store open.
@@ -160,7 +163,7 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
     let found: i64 = connection
         .query_row("SELECT version FROM format", [], |row| row.get(0))
         .map_err(refused)?;
-    if found == FORMAT {
+    if [FORMER, FORMAT].contains(&found) {
         Ok(())
     } else {
         Err(StoreError::Format { path: path.to_owned(), found, known: FORMAT })
@@ -206,6 +209,8 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
         transaction.execute("INSERT INTO format VALUES (?1)", [FORMAT])?;
         transaction.execute_batch(SCHEMA)?;
     }
+    transaction.execute_batch(evaluation_rows::TABLE)?;
+    transaction.execute("UPDATE format SET version = ?1 WHERE version = ?2", [FORMAT, FORMER])?;
     transaction.execute_batch(parts::TABLE)?;
     parts::delete_of_ended(&transaction)?;
     transaction.commit()

@@ -17,7 +17,7 @@ pub(super) const SCHEMA: &str = "
         job INTEGER NOT NULL REFERENCES job(id),
         number INTEGER NOT NULL,
         point BLOB NOT NULL,             -- seven or ten little-endian f64
-        outcomes BLOB NOT NULL,          -- per index: code byte, velocity as little-endian f64
+        outcomes BLOB NOT NULL,          -- per index: code byte, velocity as little-endian f64; more in `piece`
         estimated_error BLOB,            -- of the successes: median, largest, as little-endian f64
         workers TEXT NOT NULL,           -- whose answers are in it: a line each, PROCESS/INSTANCE HOST
         checksum BLOB NOT NULL,

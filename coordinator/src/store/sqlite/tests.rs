@@ -19,6 +19,7 @@ use super::*;
 mod damage;
 mod groups;
 mod parts;
+mod pieces;
 
 pub(super) fn job(id: u64) -> JobRecord {
     let mut parameters = Range::of_bone(
@@ -401,14 +402,14 @@ fn a_second_coordinator_is_refused() {
 
 #[test]
 fn another_format_is_refused() {
-    for version in [1, 6, 8] {
+    for version in [1, 6, 9] {
         let directory = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(directory.path()).unwrap();
         store.connection.execute("UPDATE format SET version = ?1", [version]).unwrap();
         drop(store);
         let error = SqliteStore::open(directory.path()).unwrap_err();
         let expected = format!(
-            "osteon.sqlite: this store has format {version}; this version writes 7: run the version \
+            "osteon.sqlite: this store has format {version}; this version writes 8: run the version \
              that wrote it, or choose another directory"
         );
         assert!(error.to_string().ends_with(&expected), "{error}");

@@ -1,0 +1,200 @@
+//! The results that an evaluation has received, and the workers that gave them.
+
+use std::sync::Arc;
+
+use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
+use osteon_common::outcomes::Outcomes;
+use osteon_common::quantile;
+use osteon_common::results::EstimatedError;
+
+use crate::core::indices::Indices;
+
+/// The owner of an index that has no result.
+const NOBODY: u32 = u32::MAX;
+
+/// A result for each index, up to the last one that has any: a large evaluation is not set up at once.
+/// In columns, so that the outcomes of a complete evaluation need not be copied.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Results {
+    outcomes: Arc<Vec<Outcome>>,
+    estimated_errors: Vec<f64>,
+    /// Empty as long as every decay is 0.
+    decays: Arc<Vec<f64>>,
+    /// Number of the worker that gave each result, or [`NOBODY`].
+    owners: Vec<u32>,
+    /// Number of results.
+    filled: u64,
+}
+
+impl Results {
+    /// Returns no results, with room for `realizations`.
+    pub(crate) fn with_room_for(realizations: usize) -> Self {
+        Self {
+            outcomes: Arc::new(Vec::with_capacity(realizations)),
+            estimated_errors: Vec::with_capacity(realizations),
+            decays: Arc::default(),
+            owners: Vec::with_capacity(realizations),
+            filled: 0,
+        }
+    }
+
+    /// Returns the number of indices up to the last one that has a result.
+    pub(crate) fn len(&self) -> usize {
+        self.owners.len()
+    }
+
+    /// Returns the number of results.
+    pub(crate) fn filled(&self) -> u64 {
+        self.filled
+    }
+
+    /// Returns the number of the worker that gave the result of an index; `None` if it has none.
+    pub(crate) fn owner(&self, index: usize) -> Option<u32> {
+        self.owners.get(index).copied().filter(|owner| *owner != NOBODY)
+    }
+
+    /// Returns the result of an index; `None` if it has none.
+    pub(crate) fn get(&self, index: usize) -> Option<RealizationResult> {
+        self.owner(index)?;
+        let outcome = *self.outcomes.get(index)?;
+        let estimated_error = *self.estimated_errors.get(index)?;
+        let decay = self.decays.get(index).copied().unwrap_or_default();
+        Some(RealizationResult { outcome, estimated_error, decay })
+    }
+
+    /// Gives the indices from `first` on that have no result these ones, given by a worker, whose number
+    /// is below the largest there is.
+    pub(crate) fn fill(&mut self, first: usize, solved: &[RealizationResult], owner: u32) {
+        let end = first + solved.len();
+        let length = self.len().max(end);
+        let outcomes = Arc::make_mut(&mut self.outcomes);
+        outcomes.resize(length, Err(FailureKind::NotFinite));
+        self.estimated_errors.resize(length, 0.0);
+        self.owners.resize(length, NOBODY);
+        let decays = Arc::make_mut(&mut self.decays);
+        if !decays.is_empty() || solved.iter().any(|result| result.decay.to_bits() != 0) {
+            decays.resize(length, 0.0);
+        }
+        let places = self.owners[first..end].iter_mut().zip(solved).enumerate();
+        for (index, (owned, result)) in places.filter(|(_, (owned, _))| **owned == NOBODY) {
+            *owned = owner;
+            self.filled += 1;
+            outcomes[first + index] = result.outcome;
+            self.estimated_errors[first + index] = result.estimated_error;
+            if let Some(decay) = decays.get_mut(first + index) {
+                *decay = result.decay;
+            }
+        }
+    }
+
+    /// Returns the runs of consecutive indices that have a result, or that have none.
+    pub(crate) fn runs(&self, with_result: bool) -> Vec<Indices> {
+        let mut found = Vec::new();
+        let mut first = 0;
+        for run in self.owners.chunk_by(|one, other| (*one == NOBODY) == (*other == NOBODY)) {
+            let count = run.len() as u64;
+            if run.first().is_some_and(|owner| (*owner != NOBODY) == with_result) {
+                found.push(Indices { first, count });
+            }
+            first += count;
+        }
+        found
+    }
+
+    /// Returns the number of indices from `first` on that the same worker gave a result to, at most `most`.
+    pub(crate) fn of_same_owner(&self, first: usize, most: usize) -> usize {
+        let owners = self.owners.get(first..).unwrap_or_default();
+        let Some(owner) = owners.first().filter(|owner| **owner != NOBODY) else {
+            return 0;
+        };
+        owners.iter().take(most).take_while(|of| *of == owner).count()
+    }
+
+    /// Returns all outcomes in index order, `with_decays` or without; `None` unless there are as many
+    /// as `realizations`.
+    pub(crate) fn outcomes(&self, realizations: u64, with_decays: bool) -> Option<Outcomes> {
+        if self.filled != realizations || self.len() as u64 != realizations {
+            return None;
+        }
+        let decays = with_decays.then(|| match self.decays.is_empty() {
+            true => Arc::new(vec![0.0; self.len()]),
+            false => Arc::clone(&self.decays),
+        });
+        Some(Outcomes::shared(Arc::clone(&self.outcomes), decays))
+    }
+
+    /// Returns the estimated errors of the successes.
+    pub(crate) fn estimated_error(&self) -> Option<EstimatedError> {
+        // An index without a result counts as a failure.
+        let all = self.outcomes.iter().zip(&self.estimated_errors);
+        quantile::estimated_error(
+            all.filter(|(outcome, _)| outcome.is_ok()).map(|(_, error)| *error),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn solved(velocities: &[f64]) -> Vec<RealizationResult> {
+        let result = |velocity: &f64| RealizationResult {
+            outcome: Ok(*velocity),
+            estimated_error: *velocity,
+            decay: 0.0,
+        };
+        velocities.iter().map(result).collect()
+    }
+
+    #[test]
+    fn only_indices_without_a_result_are_filled() {
+        let mut results = Results::with_room_for(6);
+        results.fill(3, &solved(&[3.0]), 0);
+        assert_eq!((results.len(), results.filled()), (4, 1));
+        assert_eq!(results.runs(true), [Indices { first: 3, count: 1 }]);
+        assert_eq!(results.runs(false), [Indices { first: 0, count: 3 }]);
+        results.fill(1, &solved(&[11.0, 12.0, 13.0, 14.0]), 1);
+        assert_eq!((results.len(), results.filled()), (5, 4));
+        let velocity = |index| results.get(index).map(|result| result.outcome.unwrap());
+        assert_eq!(
+            [0, 1, 2, 3, 4, 5].map(velocity),
+            [None, Some(11.0), Some(12.0), Some(3.0), Some(14.0), None]
+        );
+        assert_eq!(
+            [0, 1, 3, 4, 5].map(|index| results.owner(index)),
+            [None, Some(1), Some(0), Some(1), None]
+        );
+        let same = |first| results.of_same_owner(first, 9);
+        assert_eq!([0, 1, 2, 3, 4, 5].map(same), [0, 2, 1, 1, 1, 0]);
+        assert_eq!(results.of_same_owner(1, 1), 1);
+        assert_eq!(results.outcomes(5, false), None);
+        results.fill(0, &solved(&[10.0]), 2);
+        assert_eq!(results.outcomes(6, false), None);
+        let complete = results.outcomes(5, false).unwrap();
+        assert_eq!(&*complete, [10.0, 11.0, 12.0, 3.0, 14.0].map(Ok));
+    }
+
+    #[test]
+    fn decays_are_kept_from_the_first_one_on() {
+        let mut results = Results::with_room_for(3);
+        results.fill(0, &solved(&[1.0]), 0);
+        assert_eq!(results.outcomes(1, true).unwrap().decays(), Some(&[0.0][..]));
+        let mut later = solved(&[2.0, 3.0]);
+        later[1].decay = -4.5;
+        results.fill(1, &later, 0);
+        assert_eq!(results.get(2), Some(later[1]));
+        assert_eq!(results.outcomes(3, true).unwrap().decays(), Some(&[0.0, 0.0, -4.5][..]));
+        assert_eq!(results.outcomes(3, false).unwrap().decays(), None);
+    }
+
+    #[test]
+    fn errors_are_those_of_the_successes() {
+        let mut results = Results::with_room_for(4);
+        assert_eq!(results.estimated_error(), None);
+        results.fill(1, &[RealizationResult::failed(FailureKind::NoArrival)], 0);
+        assert_eq!(results.estimated_error(), None);
+        results.fill(2, &solved(&[1.0, 3.0]), 0);
+        let found = results.estimated_error().unwrap();
+        assert_eq!((found.median, found.largest), (2.0, 3.0));
+    }
+}

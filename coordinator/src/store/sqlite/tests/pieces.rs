@@ -1,0 +1,153 @@
+//! Large evaluations, whose outcomes are in several rows.
+
+use super::super::columns::{evaluation_checksum, pack_errors, pack_outcomes, pack_point};
+use super::super::evaluation_rows::PIECE_OUTCOMES;
+use super::super::opening::FORMAT;
+use super::*;
+
+/// An evaluation with so many outcomes, of which some are failures.
+fn large(number: u64, count: usize) -> EvaluationRecord {
+    let outcome = |index: usize| match index % 1000 {
+        7 => Err(FailureKind::NoArrival),
+        _ => Ok(3000.0 + index as f64 / 64.0),
+    };
+    EvaluationRecord { outcomes: (0..count).map(outcome).collect(), ..evaluation(1, number) }
+}
+
+fn store() -> (tempfile::TempDir, SqliteStore) {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    store.put_job(&job(1)).unwrap();
+    (directory, store)
+}
+
+fn rows(store: &SqliteStore, sql: &str) -> Vec<i64> {
+    let mut read = store.connection.prepare(sql).unwrap();
+    let rows = read.query_map([], |row| row.get(0)).unwrap();
+    rows.map(Result::unwrap).collect()
+}
+
+#[test]
+fn a_large_evaluation_is_read_as_it_was_written() {
+    let (directory, mut store) = store();
+    let decays = |record: &EvaluationRecord| -> Vec<f64> {
+        record.outcomes.iter().map(|outcome| outcome.map_or(0.0, |v| v / 1000.0)).collect()
+    };
+    let counts = [1, PIECE_OUTCOMES, PIECE_OUTCOMES + 1, 2 * PIECE_OUTCOMES, 200_000];
+    let mut records: Vec<EvaluationRecord> =
+        (0..).zip(counts).map(|(number, count)| large(number, count)).collect();
+    let mut with_decays = large(5, 150_000);
+    let of_it = decays(&with_decays);
+    with_decays.outcomes = with_decays.outcomes.with_decays(Some(of_it));
+    records.push(with_decays);
+    for record in &records {
+        store.put_evaluation(record, true).unwrap();
+    }
+    drop(store);
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    for record in &records {
+        let read = store.evaluation(JobId(1), record.number).unwrap().unwrap();
+        assert!(read == *record, "evaluation {} was read otherwise", record.number);
+    }
+    let sql = "SELECT count(first) FROM evaluation LEFT JOIN piece ON piece.job = evaluation.job
+               AND piece.evaluation = evaluation.number GROUP BY number ORDER BY number";
+    assert_eq!(rows(&store, sql), [0, 0, 1, 1, 3, 2]);
+}
+
+#[test]
+fn pieces_go_with_their_evaluation() {
+    let (_directory, mut store) = store();
+    let pieces = |store: &SqliteStore| rows(store, "SELECT evaluation FROM piece ORDER BY 1");
+    let put = |store: &mut SqliteStore, number, count, is_last| {
+        store.put_evaluation(&large(number, count), is_last).unwrap();
+    };
+    for number in 0..4 {
+        put(&mut store, number, PIECE_OUTCOMES + 1, true);
+    }
+    assert_eq!(pieces(&store), [0, 1, 2, 3]);
+    put(&mut store, 1, 3 * PIECE_OUTCOMES, false);
+    assert_eq!(pieces(&store), [0, 1, 1, 2, 3]);
+    put(&mut store, 1, 3, false);
+    assert_eq!(pieces(&store), [0, 2, 3]);
+    put(&mut store, 1, PIECE_OUTCOMES + 1, true);
+    assert_eq!(pieces(&store), [0, 1]);
+    store.reset_job(JobId(1), "osteon 1.2.4 numerics 5").unwrap();
+    assert_eq!(pieces(&store), [] as [i64; 0]);
+    put(&mut store, 0, PIECE_OUTCOMES + 1, true);
+    store.finish_job(&end(1), &summary(1)).unwrap();
+    store.delete_jobs(&[JobId(1)]).unwrap();
+    assert_eq!(pieces(&store), [] as [i64; 0]);
+}
+
+#[test]
+fn a_damaged_piece_is_damage_to_its_evaluation() {
+    for sql in [
+        "UPDATE piece SET outcomes = zeroblob(9) WHERE first = 65536",
+        "UPDATE piece SET checksum = x'' WHERE first = 65536",
+        "UPDATE piece SET first = 65537 WHERE first = 65536",
+        "UPDATE piece SET first = -1 WHERE first = 65536",
+        "DELETE FROM piece WHERE evaluation = 1 AND first = 131072",
+        "DELETE FROM piece WHERE evaluation = 1",
+        // Whole pieces of another evaluation.
+        "UPDATE piece SET (outcomes, checksum) = (SELECT outcomes, checksum FROM piece AS other
+         WHERE other.evaluation = 0 AND other.first = piece.first) WHERE evaluation = 1",
+        "UPDATE evaluation SET checksum = (SELECT checksum FROM evaluation WHERE number = 0)",
+    ] {
+        let (_directory, mut store) = store();
+        for number in [0, 1] {
+            store.put_evaluation(&large(number, 3 * PIECE_OUTCOMES), true).unwrap();
+        }
+        assert!(store.connection.execute(sql, []).unwrap() > 0, "{sql}");
+        let error = store.evaluation(JobId(1), 1).unwrap_err();
+        let expected = DamagedRecord::Evaluation(1);
+        assert!(
+            matches!(&error, StoreError::Damaged { record, .. } if *record == expected),
+            "{sql}: {error}"
+        );
+    }
+}
+
+#[test]
+fn a_file_of_the_former_format_is_read_and_becomes_one_of_this() {
+    let (directory, mut store) = store();
+    let records = [large(0, 3), large(1, 2 * PIECE_OUTCOMES)];
+    for record in &records {
+        store.put_evaluation(record, true).unwrap();
+    }
+    // As the former version wrote the second one: in one row.
+    let record = &records[1];
+    let (outcomes, point) = (pack_outcomes(&record.outcomes, None), pack_point(record.point));
+    let errors = record.estimated_error.map(pack_errors);
+    let workers = pack_workers(&record.workers);
+    let of = (record.job, record.number);
+    let checksum = evaluation_checksum(of, &point, (&outcomes, &[]), errors.as_deref(), &workers);
+    let sql = "UPDATE evaluation SET outcomes = ?1, checksum = ?2 WHERE number = 1";
+    store.connection.execute(sql, params![outcomes, checksum]).unwrap();
+    store.connection.execute_batch("DROP TABLE piece; UPDATE format SET version = 7").unwrap();
+    drop(store);
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    assert_eq!(rows(&store, "SELECT version FROM format"), [FORMAT]);
+    for record in &records {
+        let read = store.evaluation(JobId(1), record.number).unwrap();
+        assert!(read.as_ref() == Some(record), "evaluation {} was read otherwise", record.number);
+    }
+    let more = large(2, PIECE_OUTCOMES + 1);
+    store.put_evaluation(&more, true).unwrap();
+    assert!(store.evaluation(JobId(1), 2).unwrap() == Some(more));
+}
+
+#[test]
+fn a_large_evaluation_replaces_another_whole_or_not_at_all() {
+    let (_directory, mut store) = store();
+    let before = large(0, PIECE_OUTCOMES + 5);
+    store.put_evaluation(&before, true).unwrap();
+    let pages: i64 = store.connection.pragma_query_value(None, "page_count", |r| r.get(0)).unwrap();
+    store.connection.pragma_update(None, "max_page_count", pages + 50).unwrap();
+    let larger = large(0, 10 * PIECE_OUTCOMES);
+    let error = store.put_evaluation(&larger, true).unwrap_err();
+    assert!(matches!(error, StoreError::Full { .. }), "{error}");
+    assert!(store.evaluation(JobId(1), 0).unwrap() == Some(before));
+    store.connection.pragma_update(None, "max_page_count", 1_000_000).unwrap();
+    store.put_evaluation(&larger, true).unwrap();
+    assert!(store.evaluation(JobId(1), 0).unwrap() == Some(larger));
+}
