@@ -89,30 +89,34 @@ pub(super) fn get(
     job: JobId,
     number: u64,
 ) -> rusqlite::Result<Option<Option<EvaluationRecord>>> {
-    let Some((pieces, checksums)) = pieces(connection, job, number)? else {
+    let Some(pieces) = pieces(connection, job, number)? else {
         return Ok(Some(None));
     };
     let sql = "SELECT point, outcomes, checksum, estimated_error, workers
                FROM evaluation WHERE job = ?1 AND number = ?2";
-    let read = |row: &Row<'_>| evaluation((job, number), row, pieces, &checksums);
+    let read = |row: &Row<'_>| evaluation((job, number), row, pieces);
     connection.query_row(sql, params![job.0, number], read).optional()
 }
 
 /// Outcomes with their decays, if they have any.
 type Unpacked = (Vec<Outcome>, Option<Vec<f64>>);
 
-/// Returns the pieces of an evaluation, with the index of the first outcome of each, and their checksums;
-/// `None` if one is damaged.
-fn pieces(
-    connection: &Connection,
-    job: JobId,
-    number: u64,
-) -> rusqlite::Result<Option<(Vec<(usize, Unpacked)>, Vec<u8>)>> {
+/// The pieces of an evaluation, in order.
+#[derive(Default)]
+struct Pieces {
+    /// Each with the index of its first outcome.
+    unpacked: Vec<(usize, Unpacked)>,
+    /// Their checksums, one after the other.
+    checksums: Vec<u8>,
+}
+
+/// Returns the pieces of an evaluation; `None` if one is damaged.
+fn pieces(connection: &Connection, job: JobId, number: u64) -> rusqlite::Result<Option<Pieces>> {
     let sql = "SELECT first, outcomes, checksum FROM piece WHERE job = ?1 AND evaluation = ?2
                ORDER BY first";
     let mut select = connection.prepare(sql)?;
     let mut rows = select.query(params![job.0, number])?;
-    let (mut pieces, mut checksums) = (Vec::new(), Vec::new());
+    let mut pieces = Pieces::default();
     while let Some(row) = rows.next()? {
         let (first, outcomes) = (row.get::<_, i64>(0)?, row.get_ref(1)?.as_blob()?);
         let checksum = row.get_ref(2)?.as_blob()?;
@@ -125,24 +129,23 @@ fn pieces(
         let Some(unpacked) = unpack_outcomes(outcomes) else {
             return Ok(None);
         };
-        pieces.push((first, unpacked));
-        checksums.extend(checksum);
+        pieces.unpacked.push((first, unpacked));
+        pieces.checksums.extend(checksum);
     }
-    Ok(Some((pieces, checksums)))
+    Ok(Some(pieces))
 }
 
 /// Returns the evaluation of a row; `None` if it is damaged.
 fn evaluation(
     (job, number): (JobId, u64),
     row: &Row<'_>,
-    pieces: Vec<(usize, Unpacked)>,
-    checksums: &[u8],
+    Pieces { unpacked: pieces, checksums }: Pieces,
 ) -> rusqlite::Result<Option<EvaluationRecord>> {
     let (point, outcomes) = (row.get_ref(0)?.as_blob()?, row.get_ref(1)?.as_blob()?);
     let stored: Vec<u8> = row.get(2)?;
     let errors = row.get_ref(3)?.as_blob_or_null()?;
     let workers = row.get_ref(4)?.as_str()?;
-    let found = evaluation_checksum((job, number), point, (outcomes, checksums), errors, workers);
+    let found = evaluation_checksum((job, number), point, (outcomes, &checksums), errors, workers);
     let unpacked = || {
         let outcomes = joined(unpack_outcomes(outcomes)?, pieces)?;
         let estimated_error = match errors {
