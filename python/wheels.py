@@ -9,6 +9,7 @@ import argparse
 import os
 import pathlib
 import platform
+import re
 import shutil
 import sys
 import zipfile
@@ -20,7 +21,10 @@ sys.path.insert(0, str(ROOT / "tests" / "python"))
 from environment import check_version, make, run  # noqa: E402
 
 GLIBC = "2.17"
-PROCESSORS = ("x86_64", "aarch64")
+MACHINES = {"x86_64": 62, "aarch64": 183}
+"""The processors, and their numbers in ELF files."""
+
+PROCESSORS = tuple(MACHINES)
 SCRIPTS = HERE / "osteon.data" / "scripts"
 
 
@@ -66,17 +70,16 @@ def build(python, work, processor, profile):
 
 
 def check(wheel, processor, trial):
-    """Fails unless the wheel holds a program for the processor; installs and uses it if this machine has that
-    processor."""
+    """Fails unless the wheel says that it is for the processor, and holds a program and a module that are; installs
+    and uses it if this machine has that processor."""
+    if f"manylinux2014_{processor}" not in wheel.stem.split("-")[-1].split("."):
+        sys.exit(f"the name of {wheel.name} must end in a tag manylinux2014_{processor}")
     with zipfile.ZipFile(wheel) as files:
-        [script] = [name for name in files.namelist() if name.endswith(".data/scripts/osteon")]
-        program = files.read(script)
-    # The header of an ELF file: magic, and the processor at byte 18.
-    machine = {"x86_64": 62, "aarch64": 183}[processor]
-    if program[:4] != b"\x7fELF" or int.from_bytes(program[18:20], "little") != machine:
-        sys.exit(f"{wheel.name} holds no program for {processor}, but {len(program)} bytes of something else")
+        for end in (".data/scripts/osteon", "osteon/_native.abi3.so"):
+            [name] = [name for name in files.namelist() if name.endswith(end)]
+            examine(f"{name} of {wheel.name}", files.read(name), processor)
     if platform.machine() != processor:
-        print(f"{wheel.name} is for another processor and was not tried")
+        print(f"{wheel.name} is for another processor: it was compiled and looked at, but not tried")
         return
     shutil.rmtree(trial, ignore_errors=True)
     run([sys.executable, "-m", "venv", trial])
@@ -84,6 +87,20 @@ def check(wheel, processor, trial):
     run([trial / "bin" / "osteon", "--version"])
     use = "import osteon, sys; print(osteon.simulate(sys.argv[1]).velocity, 'm/s')"
     run([trial / "bin" / "python", "-c", use, ROOT / "examples" / "cases" / "A.toml"])
+
+
+def examine(name, content, processor):
+    """Fails unless an ELF file is for the processor and for the glibc; maturin examines the module only."""
+    # The header begins with a magic; the processor is at byte 18.
+    if content[:4] != b"\x7fELF" or int.from_bytes(content[18:20], "little") != MACHINES[processor]:
+        sys.exit(f"{name} is no program for {processor}, but {len(content)} bytes of something else")
+    # Versions of symbols, of which the newest counts.
+    versions = re.findall(rb"\0GLIBC_([\d.]+)(?=\0)", content)
+    needed = max((tuple(map(int, version.split(b"."))) for version in versions), default=(0,))
+    newest = ".".join(map(str, needed))
+    if needed > tuple(map(int, GLIBC.split("."))):
+        sys.exit(f"{name} needs glibc {newest}; it must run with {GLIBC}")
+    print(f"{name}: {processor}, glibc {newest}")
 
 
 if __name__ == "__main__":
