@@ -50,22 +50,41 @@ impl Sifted {
 
     fn around_median(numbers: impl Iterator<Item = f64> + Clone) -> Option<Self> {
         let mut counts = vec![0_usize; 1 << BIN_BITS];
-        let count_in_bin = |number: &f64| counts[bin(*number)] += 1;
-        let largest = numbers.clone().inspect(count_in_bin).max_by(f64::total_cmp)?;
-        let count = counts.iter().sum();
-        let (below, _) = place(count - 1, 0.5);
+        let mut largest = 0;
+        for number in numbers.clone() {
+            let ascending = ascending(number);
+            counts[bin(ascending)] += 1;
+            largest = largest.max(ascending);
+        }
+        let count: usize = counts.iter().sum();
+        let (below, _) = place(count.checked_sub(1)?, 0.5);
         let (first, before) = bin_of(&counts, below);
         let (last, _) = bin_of(&counts, (below + 1).min(count - 1));
-        let numbers = numbers.filter(|number| (first..=last).contains(&bin(*number))).collect();
-        Some(Self { numbers, before, count, largest })
+        let is_near = |number: &f64| (first..=last).contains(&bin(ascending(*number)));
+        let mut near = Vec::with_capacity(counts[first..=last].iter().sum());
+        near.extend(numbers.filter(is_near));
+        Some(Self { numbers: near, before, count, largest: of_ascending(largest) })
     }
 }
 
-/// Returns the bin of a number: a larger one is in the same bin or in a later one.
-fn bin(number: f64) -> usize {
+/// Returns an integer that is larger for a larger number.
+fn ascending(number: f64) -> u64 {
     let bits = number.to_bits();
     // Negative numbers descend with their bits.
-    let ascending = if number.is_sign_negative() { !bits } else { bits | 1 << 63 };
+    if number.is_sign_negative() { !bits } else { bits | SIGN }
+}
+
+/// Returns the number of an integer from [`ascending`].
+fn of_ascending(integer: u64) -> f64 {
+    f64::from_bits(if integer < SIGN { !integer } else { integer & !SIGN })
+}
+
+/// The bit of the sign.
+const SIGN: u64 = 1 << 63;
+
+/// Returns the bin of a number, from its [`ascending`] integer: a larger one is in the same bin or in a later
+/// one.
+fn bin(ascending: u64) -> usize {
     (ascending >> (u64::BITS - BIN_BITS)) as usize
 }
 

@@ -5,6 +5,9 @@
 //! ([`Effect::Complete`](crate::core::effect::Effect::Complete)), and gets back first a record, which is
 //! stored meanwhile, and then the search.
 
+use std::panic::resume_unwind;
+use std::thread;
+
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::JobId;
 use crate::store::EvaluationRecord;
@@ -45,17 +48,21 @@ impl Completion {
     /// was not settled. Takes a while, and depends on nothing else.
     pub fn run(self, gathered: impl FnOnce(Gathered)) -> Option<Completed> {
         let Self { job, evaluation, search: mut after } = self;
-        let attempt = evaluation.attempt;
-        let with_decays = after.has_decays();
-        let (outcomes, estimated_error) = evaluation.complete(with_decays)?;
-        let is_last = evaluation.diverges_from_store(&outcomes);
-        let (number, point) = (evaluation.number, evaluation.point);
-        let workers = evaluation.workers.iter().cloned().collect();
-        let copy = outcomes.clone();
-        let record =
-            EvaluationRecord { job, number, point, outcomes: copy, estimated_error, workers };
-        gathered(Gathered { job, attempt, record, is_last });
-        drop(evaluation);
+        let (number, attempt, point) = (evaluation.number, evaluation.attempt, evaluation.point);
+        let outcomes = evaluation.outcomes(after.has_decays())?;
+        let (estimated_error, assessment) = thread::scope(|scope| {
+            // The record waits for the errors alone.
+            let assessed = scope.spawn(|| after.assess(&point, &outcomes));
+            let estimated_error = evaluation.estimated_error();
+            let is_last = evaluation.diverges_from_store(&outcomes);
+            let (outcomes, workers) = (outcomes.clone(), evaluation.workers.iter().cloned());
+            let workers = workers.collect();
+            let record =
+                EvaluationRecord { job, number, point, outcomes, estimated_error, workers };
+            gathered(Gathered { job, attempt, record, is_last });
+            (estimated_error, assessed.join().unwrap_or_else(|panic| resume_unwind(panic)))
+        });
+        after.anticipate(assessment);
         after.tell(outcomes, estimated_error);
         Some(Completed { job, attempt, after })
     }
