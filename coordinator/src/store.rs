@@ -68,6 +68,22 @@ pub struct EvaluationRecord {
     pub workers: BTreeSet<WorkerName>,
 }
 
+/// Number of outcomes in the row of an evaluation, and in each of its pieces but the last.
+pub const PIECE_OUTCOMES: usize = 1 << 16;
+
+/// A piece of an evaluation: so many of its outcomes, after the first ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PieceRecord {
+    /// The job.
+    pub job: JobId,
+    /// Number of the evaluation.
+    pub number: u64,
+    /// Index of the first outcome, a multiple of [`PIECE_OUTCOMES`], not 0.
+    pub first: u64,
+    /// The outcomes, in index order.
+    pub outcomes: Outcomes,
+}
+
 /// Results that an evaluation has received so far.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartRecord {
@@ -254,6 +270,16 @@ pub trait Store {
     /// # Errors
     /// When they are not durable.
     fn put_part(&mut self, record: &PartRecord) -> Result<(), StoreError> {
+        let _ = record;
+        Ok(())
+    }
+
+    /// Keeps a piece of an evaluation that is not stored yet, so that less of it is left to be written; its
+    /// record need not agree with it. A store may do without.
+    ///
+    /// # Errors
+    /// When it is not durable.
+    fn put_piece(&mut self, record: &PieceRecord) -> Result<(), StoreError> {
         let _ = record;
         Ok(())
     }

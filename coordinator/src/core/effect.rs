@@ -14,7 +14,7 @@ use crate::core::close_reason::CloseReason;
 use crate::core::completion::Completion;
 use crate::core::ids::{BatchId, JobId, LeaseId, ReplyId, WorkerId};
 use crate::core::notice::Notice;
-use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord};
+use crate::store::{BanRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord, PieceRecord};
 
 /// An action for the shell.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,6 +122,13 @@ pub enum Record {
     /// Results of an evaluation that is not complete, or that the search has not asked for. They are
     /// only a help: nothing waits for them, and they are not part of any result.
     Part(PartRecord),
+    /// A piece of an evaluation that is not complete. It is only a help, as a part is.
+    Piece {
+        /// The piece.
+        record: PieceRecord,
+        /// The attempt at the evaluation.
+        attempt: u64,
+    },
     /// The end of a job.
     End {
         /// The end.
@@ -157,6 +164,7 @@ impl Record {
                 (job, RecordKey::Evaluation(number))
             }
             Self::Part(record) => (record.job, RecordKey::Part),
+            Self::Piece { record, attempt } => (record.job, RecordKey::Piece(*attempt)),
             Self::End { end, .. } => (end.job, RecordKey::End),
             Self::Ban(record) => (record.job, RecordKey::Ban(record.number)),
         }
@@ -172,6 +180,8 @@ pub enum RecordKey {
     Evaluation(u64),
     /// Results of an evaluation.
     Part,
+    /// A piece of an evaluation, in the attempt with this number.
+    Piece(u64),
     /// The end of the job.
     End,
     /// The ban with this number, of a worker that was found in this job.

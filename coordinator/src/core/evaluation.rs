@@ -8,6 +8,7 @@ use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::results::EstimatedError;
 
+use self::pieces::SentPieces;
 use self::results::Results;
 use crate::core::crashes::{Crashes, LostWorker};
 use crate::core::dispute::{self, Dispute, Vote};
@@ -15,7 +16,10 @@ use crate::core::indices::Indices;
 use crate::core::worker_name::WorkerName;
 use crate::store::PartPiece;
 
+mod pieces;
 mod results;
+
+pub(crate) use self::pieces::take_pieces;
 
 /// A batch that is to be computed a second time by another worker.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,6 +76,8 @@ pub struct PendingEvaluation {
     pub(crate) disputes: Vec<Dispute>,
     /// Indices that were filled since its results were last saved.
     pub(crate) unsaved: Vec<Indices>,
+    /// Its pieces that were sent to the store.
+    pub(crate) pieces: SentPieces,
     /// Time from which on its results are saved; `None` until the next tick.
     pub(crate) save_at: Option<Duration>,
     /// A worker was lost over it. While it is speculative, no further worker is risked for it until
@@ -98,6 +104,7 @@ impl PendingEvaluation {
             audits_out: 0,
             disputes: Vec::new(),
             unsaved: Vec::new(),
+            pieces: SentPieces::default(),
             save_at: None,
             has_crashed_worker: false,
         }

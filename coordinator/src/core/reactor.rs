@@ -89,6 +89,7 @@ fn tick(turn: &mut Turn) {
     checks::give_up(turn);
     if !turn.state.draining {
         ticks::save_parts(turn, false);
+        ticks::store_pieces(turn);
         ticks::fail_poisoned(turn);
         ticks::store_again(turn);
         bans::store_again(turn);

@@ -90,6 +90,7 @@ fn put(store: &mut dyn Store, record: &Record) -> Result<(), StoreError> {
         Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
         Record::Evaluations(records) => store.put_evaluations(records),
         Record::Part(record) => store.put_part(record),
+        Record::Piece { record, .. } => store.put_piece(record),
         Record::End { end, summary } => store.finish_job(end, summary),
         Record::Ban(record) => ban(store, record),
     }
@@ -112,6 +113,7 @@ fn bytes(record: &Record) -> usize {
             Record::Part(record) => {
                 record.pieces.iter().map(|piece| RECORD_BYTES + size_of_val(&*piece.results)).sum()
             }
+            Record::Piece { record, .. } => size_of_val(&*record.outcomes),
             Record::End { summary, .. } => {
                 size_of_val(&*summary.history) + size_of_val(&*summary.groups)
             }

@@ -19,7 +19,7 @@ use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::{
     BanRecord, BetweenPieces, Changes, DamagedRecord, EndRecord, EvaluationRecord, JobRecord,
-    PartRecord, Store, StoreError, StoredJob,
+    PartRecord, PieceRecord, Store, StoreError, StoredJob,
 };
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
@@ -219,7 +219,7 @@ impl SqliteStore {
     /// Deletes jobs and all their records; their identifiers are never assigned again.
     fn remove_jobs(&self, jobs: &[JobId]) -> rusqlite::Result<()> {
         let transaction = self.connection.unchecked_transaction()?;
-        for table in ["summary", "ending", "evaluation", "part"] {
+        for table in ["summary", "ending", "evaluation", "piece", "part"] {
             let sql = format!("DELETE FROM {table} WHERE job = ?1");
             let mut delete = transaction.prepare(&sql)?;
             for job in jobs {
@@ -282,7 +282,10 @@ impl Store for &SqliteStore {
         };
         let reset_job = || -> rusqlite::Result<()> {
             let transaction = self.connection.unchecked_transaction()?;
-            transaction.execute("DELETE FROM evaluation WHERE job = ?1", params![job.0])?;
+            for table in ["evaluation", "piece"] {
+                let sql = format!("DELETE FROM {table} WHERE job = ?1");
+                transaction.execute(&sql, params![job.0])?;
+            }
             parts::delete_of(&transaction, job)?;
             let encoded: Vec<u8> = transaction.query_row(
                 "SELECT specification FROM job WHERE id = ?1",
@@ -330,8 +333,7 @@ impl Store for &SqliteStore {
             let point = evaluation_rows::put(connection, record)?;
             self.stale.borrow_mut().add_at(connection, job, &point)?;
             if is_last {
-                let sql = "DELETE FROM evaluation WHERE job = ?1 AND number > ?2";
-                connection.execute(sql, params![job.0, number])?;
+                evaluation_rows::delete_after(connection, job, number)?;
             }
             Ok(())
         })
@@ -346,6 +348,10 @@ impl Store for &SqliteStore {
 
     fn put_part(&mut self, record: &PartRecord) -> Result<(), StoreError> {
         self.change(|connection| parts::put(connection, record))
+    }
+
+    fn put_piece(&mut self, record: &PieceRecord) -> Result<(), StoreError> {
+        self.change(|connection| evaluation_rows::put_piece(connection, record))
     }
 
     fn parts(&mut self, job: JobId) -> Result<Vec<PartRecord>, StoreError> {
@@ -376,6 +382,7 @@ impl Store for &SqliteStore {
         self.change(|connection| {
             connection.execute(sql, values)?;
             summary::put(connection, record.job, summary)?;
+            evaluation_rows::delete_loose_pieces(connection, record.job)?;
             self.stale.borrow_mut().add_of(connection, record.job)
         })
     }

@@ -113,6 +113,7 @@ pub(crate) fn written(store: &mut dyn Store, record: &Record) -> Event {
         Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
         Record::Evaluations(records) => store.put_evaluations(records),
         Record::Part(record) => store.put_part(record),
+        Record::Piece { record, .. } => store.put_piece(record),
         Record::End { end, summary } => store.finish_job(end, summary),
         Record::Ban(record) => store.put_ban(record),
     }

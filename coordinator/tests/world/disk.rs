@@ -40,7 +40,8 @@ impl World {
                 self.counts.prepared += records.len() as u64;
                 records.iter().for_each(|record| self.look_at_evaluation(record, true));
             }
-            Record::Job(_) | Record::Part(_) => {}
+            // Evaluations here are too small for pieces.
+            Record::Job(_) | Record::Part(_) | Record::Piece { .. } => {}
         }
     }
 
@@ -79,7 +80,7 @@ impl World {
                 self.seeds.insert(record.job, record.specification.monte_carlo.seed);
             }
             Record::Part(_) => self.counts.saved += 1,
-            Record::End { .. } | Record::Ban(_) => {}
+            Record::Piece { .. } | Record::End { .. } | Record::Ban(_) => {}
         }
         fake::written(&mut self.store, record)
     }

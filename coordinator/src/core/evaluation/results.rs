@@ -1,5 +1,6 @@
 //! The results that an evaluation has received, and the workers that gave them.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
@@ -8,15 +9,19 @@ use osteon_common::quantile;
 use osteon_common::results::EstimatedError;
 
 use crate::core::indices::Indices;
+use crate::store::PIECE_OUTCOMES;
 
 /// The owner of an index that has no result.
 const NOBODY: u32 = u32::MAX;
+/// The estimated error of an index that has no velocity.
+const NO_VELOCITY: f64 = -1.0;
 
 /// A result for each index, up to the last one that has any: a large evaluation is not set up at once.
 /// In columns, so that the outcomes of a complete evaluation need not be copied.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Results {
     outcomes: Arc<Vec<Outcome>>,
+    /// [`NO_VELOCITY`] or at least 0: among millions the velocities are found without the outcomes.
     estimated_errors: Vec<f64>,
     /// Empty as long as every decay is 0.
     decays: Arc<Vec<f64>>,
@@ -24,6 +29,8 @@ pub(crate) struct Results {
     owners: Vec<u32>,
     /// Number of results.
     filled: u64,
+    /// Number of results of each piece.
+    filled_of_piece: Vec<usize>,
 }
 
 impl Results {
@@ -35,6 +42,7 @@ impl Results {
             decays: Arc::default(),
             owners: Vec::with_capacity(realizations),
             filled: 0,
+            filled_of_piece: Vec::new(),
         }
     }
 
@@ -57,7 +65,10 @@ impl Results {
     pub(crate) fn get(&self, index: usize) -> Option<RealizationResult> {
         self.owner(index)?;
         let outcome = *self.outcomes.get(index)?;
-        let estimated_error = *self.estimated_errors.get(index)?;
+        let estimated_error = match outcome {
+            Ok(_) => *self.estimated_errors.get(index)?,
+            Err(_) => 0.0,
+        };
         let decay = self.decays.get(index).copied().unwrap_or_default();
         Some(RealizationResult { outcome, estimated_error, decay })
     }
@@ -69,8 +80,9 @@ impl Results {
         let length = self.len().max(end);
         let outcomes = Arc::make_mut(&mut self.outcomes);
         outcomes.resize(length, Err(FailureKind::NotFinite));
-        self.estimated_errors.resize(length, 0.0);
+        self.estimated_errors.resize(length, NO_VELOCITY);
         self.owners.resize(length, NOBODY);
+        self.filled_of_piece.resize(length.div_ceil(PIECE_OUTCOMES), 0);
         let decays = Arc::make_mut(&mut self.decays);
         if !decays.is_empty() || solved.iter().any(|result| result.decay.to_bits() != 0) {
             decays.resize(length, 0.0);
@@ -79,8 +91,11 @@ impl Results {
         for (index, (owned, result)) in places.filter(|(_, (owned, _))| **owned == NOBODY) {
             *owned = owner;
             self.filled += 1;
+            self.filled_of_piece[(first + index) / PIECE_OUTCOMES] += 1;
             outcomes[first + index] = result.outcome;
-            self.estimated_errors[first + index] = result.estimated_error;
+            if result.outcome.is_ok() {
+                self.estimated_errors[first + index] = result.estimated_error;
+            }
             if let Some(decay) = decays.get_mut(first + index) {
                 *decay = result.decay;
             }
@@ -110,6 +125,23 @@ impl Results {
         owners.iter().take(most).take_while(|of| *of == owner).count()
     }
 
+    /// Returns the numbers of the pieces that have all their results.
+    pub(crate) fn full_pieces(&self) -> impl Iterator<Item = usize> {
+        let counts = self.filled_of_piece.iter().enumerate();
+        counts.filter(|(_, filled)| **filled == PIECE_OUTCOMES).map(|(piece, _)| piece)
+    }
+
+    /// Returns a copy of the outcomes of indices that have a result, `with_decays` or without; `None` if
+    /// there are fewer indices.
+    pub(crate) fn outcomes_in(&self, indices: Range<usize>, with_decays: bool) -> Option<Outcomes> {
+        let outcomes = self.outcomes.get(indices.clone())?.to_vec();
+        let decays = with_decays.then(|| match self.decays.get(indices) {
+            Some(decays) => decays.to_vec(),
+            None => vec![0.0; outcomes.len()],
+        });
+        Some(Outcomes::from(outcomes).with_decays(decays))
+    }
+
     /// Returns all outcomes in index order, `with_decays` or without; `None` unless there are as many
     /// as `realizations`.
     pub(crate) fn outcomes(&self, realizations: u64, with_decays: bool) -> Option<Outcomes> {
@@ -125,11 +157,8 @@ impl Results {
 
     /// Returns the estimated errors of the successes.
     pub(crate) fn estimated_error(&self) -> Option<EstimatedError> {
-        // An index without a result counts as a failure.
-        let all = self.outcomes.iter().zip(&self.estimated_errors);
-        quantile::estimated_error(
-            all.filter(|(outcome, _)| outcome.is_ok()).map(|(_, error)| *error),
-        )
+        let all = self.estimated_errors.iter().copied();
+        quantile::estimated_error(all.filter(|error| *error >= 0.0))
     }
 }
 
@@ -188,11 +217,12 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_those_of_the_successes() {
+    fn errors_are_those_of_the_velocities() {
         let mut results = Results::with_room_for(4);
         assert_eq!(results.estimated_error(), None);
-        results.fill(1, &[RealizationResult::failed(FailureKind::NoArrival)], 0);
-        assert_eq!(results.estimated_error(), None);
+        let failed = RealizationResult::failed(FailureKind::NoArrival);
+        results.fill(1, &[failed], 0);
+        assert_eq!((results.get(1), results.estimated_error()), (Some(failed), None));
         results.fill(2, &solved(&[1.0, 3.0]), 0);
         let found = results.estimated_error().unwrap();
         assert_eq!((found.median, found.largest), (2.0, 3.0));

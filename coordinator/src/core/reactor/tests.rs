@@ -85,8 +85,11 @@ impl Rig {
             panic!("{insane}\n{:#?}", self.state);
         }
         // Notices for the log, and what is saved of incomplete evaluations, have tests of their own.
-        let aside =
-            |effect: &&Effect| matches!(effect, Effect::Note(_) | Effect::Store(Record::Part(_)));
+        let aside = |effect: &&Effect| match effect {
+            Effect::Note(_) => true,
+            Effect::Store(record) => matches!(record, Record::Part(_) | Record::Piece { .. }),
+            _ => false,
+        };
         let acts = effects.iter().filter(|effect| !aside(effect));
         acts.map(described).collect()
     }
@@ -236,6 +239,9 @@ fn described(effect: &Effect) -> String {
         Effect::Store(Record::Part(record)) => {
             let count: usize = record.pieces.iter().map(|piece| piece.results.len()).sum();
             format!("save {count} of job {}", record.job)
+        }
+        Effect::Store(Record::Piece { record, .. }) => {
+            format!("store job {} evaluation {} from {}", record.job, record.number, record.first)
         }
         Effect::Store(Record::Ban(record)) => {
             format!("store ban {}: {} {}", record.number, record.worker, record.reason)

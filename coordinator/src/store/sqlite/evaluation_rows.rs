@@ -1,6 +1,9 @@
 //! Evaluations as rows: the first outcomes are in a row of `evaluation`, and those of a large one that
 //! follow are in rows of `piece`.
 //!
+//! Pieces may be stored before their evaluation. Its record need not agree with them: those that differ
+//! are replaced.
+//!
 //! SQLite copies a row several times. Copies of a piece stay in the cache of the processor, and the next
 //! piece uses their memory again; a row of 90 MB took twice as long as its pieces.
 
@@ -13,7 +16,7 @@ use super::columns::{
     unpack_errors, unpack_outcomes, unpack_workers,
 };
 use crate::core::ids::JobId;
-use crate::store::EvaluationRecord;
+use crate::store::{EvaluationRecord, PIECE_OUTCOMES, PieceRecord};
 
 /// The table of pieces.
 pub(super) const TABLE: &str = "
@@ -21,24 +24,17 @@ pub(super) const TABLE: &str = "
         job INTEGER NOT NULL,
         evaluation INTEGER NOT NULL,     -- number
         first INTEGER NOT NULL,          -- index
+        checksum BLOB NOT NULL,          -- before the outcomes, so that it is read without them
         outcomes BLOB NOT NULL,          -- from this index on, as of an evaluation
-        checksum BLOB NOT NULL,
-        PRIMARY KEY (job, evaluation, first),
-        FOREIGN KEY (job, evaluation) REFERENCES evaluation(job, number)
-            ON DELETE CASCADE DEFERRABLE INITIALLY DEFERRED
+        PRIMARY KEY (job, evaluation, first)
     );
 ";
-
-/// Number of outcomes in the row of an evaluation, and in each of its pieces but the last.
-pub(super) const PIECE_OUTCOMES: usize = 1 << 16;
 
 /// Adds an evaluation in place of the one with its number, in the open transaction. Returns its point
 /// as stored.
 pub(super) fn put(connection: &Connection, record: &EvaluationRecord) -> rusqlite::Result<Vec<u8>> {
     let (job, number) = (record.job, record.number);
-    // Its pieces go with it.
-    let mut delete = connection.prepare("DELETE FROM evaluation WHERE job = ?1 AND number = ?2")?;
-    delete.execute(params![job.0, number])?;
+    delete(connection, job, number)?;
     let pieces = put_pieces(connection, record)?;
     let point = pack_point(record.point);
     let outcomes = packed(record, 0);
@@ -58,22 +54,72 @@ pub(super) fn put(connection: &Connection, record: &EvaluationRecord) -> rusqlit
     Ok(point)
 }
 
-/// Adds the pieces of an evaluation. Returns their checksums.
-fn put_pieces(connection: &Connection, record: &EvaluationRecord) -> rusqlite::Result<Vec<u8>> {
-    let mut checksums = Vec::new();
-    if record.outcomes.len() <= PIECE_OUTCOMES {
-        return Ok(checksums);
+/// Deletes an evaluation. Its pieces go with it, even if they have the same checksums as those to come: they
+/// may be damaged.
+fn delete(connection: &Connection, job: JobId, number: u64) -> rusqlite::Result<()> {
+    let sql = "DELETE FROM evaluation WHERE job = ?1 AND number = ?2";
+    if connection.prepare(sql)?.execute(params![job.0, number])? > 0 {
+        let sql = "DELETE FROM piece WHERE job = ?1 AND evaluation = ?2";
+        connection.prepare(sql)?.execute(params![job.0, number])?;
     }
-    let sql = "INSERT INTO piece (job, evaluation, first, outcomes, checksum)
-               VALUES (?1, ?2, ?3, ?4, ?5)";
-    let mut insert = connection.prepare(sql)?;
-    for first in (PIECE_OUTCOMES..record.outcomes.len()).step_by(PIECE_OUTCOMES) {
+    Ok(())
+}
+
+/// Adds the pieces of an evaluation that are not there. Returns their checksums. Those that are there are as
+/// many at most, since all evaluations of a job have as many outcomes.
+fn put_pieces(connection: &Connection, record: &EvaluationRecord) -> rusqlite::Result<Vec<u8>> {
+    let (job, number, count) = (record.job, record.number, record.outcomes.len());
+    let mut checksums = Vec::new();
+    for first in (PIECE_OUTCOMES..count).step_by(PIECE_OUTCOMES) {
         let outcomes = packed(record, first);
-        let checksum = piece_checksum(record.job, record.number, first as u64, &outcomes);
-        insert.execute(params![record.job.0, record.number, first, outcomes, checksum])?;
-        checksums.extend(checksum);
+        checksums.extend(put_packed(connection, (job, number, first as u64), &outcomes)?);
     }
     Ok(checksums)
+}
+
+/// Adds a piece of an evaluation, unless it is there.
+pub(super) fn put_piece(connection: &Connection, record: &PieceRecord) -> rusqlite::Result<()> {
+    let outcomes = pack_outcomes(&record.outcomes, record.outcomes.decays());
+    put_packed(connection, (record.job, record.number, record.first), &outcomes).map(drop)
+}
+
+/// Adds a piece with these outcomes, unless it is there. Returns its checksum.
+fn put_packed(
+    connection: &Connection,
+    (job, number, first): (JobId, u64, u64),
+    outcomes: &[u8],
+) -> rusqlite::Result<Vec<u8>> {
+    let checksum = piece_checksum(job, number, first, outcomes);
+    let sql = "SELECT 1 FROM piece WHERE job = ?1 AND evaluation = ?2 AND first = ?3
+               AND checksum = ?4";
+    let known = params![job.0, number, first, checksum];
+    if !connection.prepare(sql)?.exists(known)? {
+        let sql = "INSERT OR REPLACE INTO piece (job, evaluation, first, checksum, outcomes)
+                   VALUES (?1, ?2, ?3, ?4, ?5)";
+        let values = params![job.0, number, first, checksum, outcomes];
+        connection.prepare(sql)?.execute(values)?;
+    }
+    Ok(checksum)
+}
+
+/// Deletes the evaluations of a job after this number.
+pub(super) fn delete_after(
+    connection: &Connection,
+    job: JobId,
+    number: u64,
+) -> rusqlite::Result<()> {
+    for (table, column) in [("evaluation", "number"), ("piece", "evaluation")] {
+        let sql = format!("DELETE FROM {table} WHERE job = ?1 AND {column} > ?2");
+        connection.execute(&sql, params![job.0, number])?;
+    }
+    Ok(())
+}
+
+/// Deletes the pieces of a job that belong to no evaluation.
+pub(super) fn delete_loose_pieces(connection: &Connection, job: JobId) -> rusqlite::Result<()> {
+    let sql = "DELETE FROM piece WHERE job = ?1 AND NOT EXISTS (SELECT 1 FROM evaluation
+               WHERE evaluation.job = ?1 AND evaluation.number = piece.evaluation)";
+    connection.prepare(sql)?.execute(params![job.0]).map(drop)
 }
 
 /// Returns the outcomes of a row, from this index on.

@@ -9,8 +9,8 @@ use super::SqliteStore;
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
 use crate::store::{
-    BanRecord, BetweenPieces, Changes, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store,
-    StoreError, StoredJob,
+    BanRecord, BetweenPieces, Changes, EndRecord, EvaluationRecord, JobRecord, PartRecord,
+    PieceRecord, Store, StoreError, StoredJob,
 };
 
 impl Store for SqliteStore {
@@ -60,6 +60,10 @@ impl Store for SqliteStore {
 
     fn put_part(&mut self, record: &PartRecord) -> Result<(), StoreError> {
         (&*self).put_part(record)
+    }
+
+    fn put_piece(&mut self, record: &PieceRecord) -> Result<(), StoreError> {
+        (&*self).put_piece(record)
     }
 
     fn parts(&mut self, job: JobId) -> Result<Vec<PartRecord>, StoreError> {

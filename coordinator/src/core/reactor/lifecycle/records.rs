@@ -68,6 +68,10 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
         }
         // Nothing waits for parts.
         (RecordKey::Part, _) => return,
+        (RecordKey::Piece(attempt), stage) => {
+            forget_piece(stage, attempt);
+            return;
+        }
         // Ignore the report of a write that has since been repeated.
         _ => {}
     }
@@ -98,6 +102,15 @@ pub(crate) fn completed(turn: &mut Turn, completed: Completed) {
     }
 }
 
+/// Handles the report on a piece, whether it was stored or not: the record of the evaluation has it too.
+fn forget_piece(stage: &mut Stage, of_attempt: u64) {
+    if let Stage::Computing(PendingEvaluation { attempt, pieces, .. }) = stage
+        && *attempt == of_attempt
+    {
+        pieces.being_stored = pieces.being_stored.saturating_sub(1);
+    }
+}
+
 /// Continues a job whose search has taken in what was stored.
 fn go_on(turn: &mut Turn, id: JobId) {
     if turn.state.jobs.get(&id).is_some_and(|job| job.restart_pending) {
@@ -114,6 +127,12 @@ pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: St
     if key == RecordKey::Part {
         if let Some(job) = turn.state.jobs.get_mut(&id) {
             job.certain_mut().for_each(PendingEvaluation::save_again);
+        }
+        return;
+    }
+    if let RecordKey::Piece(attempt) = key {
+        if let Some(job) = turn.state.jobs.get_mut(&id) {
+            forget_piece(&mut job.stage, attempt);
         }
         return;
     }

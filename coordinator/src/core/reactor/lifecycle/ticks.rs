@@ -5,8 +5,9 @@ use std::time::Duration;
 use super::{jobs, records, workers};
 use crate::core::close_reason::CloseReason;
 use crate::core::effect::{Effect, Record};
+use crate::core::evaluation::take_pieces;
 use crate::core::ids::{JobId, WorkerId};
-use crate::core::job::sequence;
+use crate::core::job::{Stage, sequence};
 use crate::core::reactor::dispatch::poison;
 use crate::core::reactor::turn::Turn;
 use crate::core::saved::{self, SAVE_AFTER, SAVE_EVERY, SAVED_AT_ONCE_MAX};
@@ -127,6 +128,22 @@ pub(crate) fn save_parts(turn: &mut Turn, before_stop: bool) {
         for mut complete in job.ahead.take_unsaved(now.saturating_sub(age)) {
             let part = saved::take_unsaved(&mut complete, *id, u64::MAX);
             turn.effects.extend(part.map(|part| Effect::Store(Record::Part(part))));
+        }
+    }
+}
+
+/// Stores pieces of large evaluations that have all their outcomes.
+pub(crate) fn store_pieces(turn: &mut Turn) {
+    for id in &turn.state.active {
+        let Some(job) = turn.state.jobs.get_mut(id) else {
+            continue;
+        };
+        // Others may get another number.
+        if let Stage::Computing(evaluation) = &mut job.stage {
+            let attempt = evaluation.attempt;
+            let pieces = take_pieces(evaluation, *id, job.search.has_decays()).into_iter();
+            let stored = pieces.map(|record| Effect::Store(Record::Piece { record, attempt }));
+            turn.effects.extend(stored);
         }
     }
 }

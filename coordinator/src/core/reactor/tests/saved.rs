@@ -1,10 +1,12 @@
 //! Results of incomplete evaluations: saved now and then, and used after a restart.
 
 use super::*;
+use crate::core::indices::Indices;
+use crate::core::job::Stage;
 use crate::core::reactor::Restored;
 use crate::core::worker_name::WorkerName;
 use crate::store::memory::MemoryStore;
-use crate::store::{BanRecord, Store as _};
+use crate::store::{BanRecord, PIECE_OUTCOMES, Store as _};
 
 /// Returns a rig with a propagation of 100 realizations of which worker 1 has answered the first
 /// batches, and worker 2 none.
@@ -150,4 +152,49 @@ fn a_complete_evaluation_leaves_nothing_saved() {
         }
     }
     assert!(store.parts(JobId(1)).unwrap().is_empty());
+}
+
+#[test]
+fn full_pieces_of_a_large_evaluation_are_stored_before_it_is_complete() {
+    let mut rig = Rig::with(3 * PIECE_OUTCOMES as u64, &[4]);
+    let piece = PIECE_OUTCOMES as u64;
+    let fill = |rig: &mut Rig, first, count| {
+        let job = rig.state.jobs.get_mut(&JobId(1)).unwrap();
+        let Stage::Computing(evaluation) = &mut job.stage else { panic!("nothing is computed") };
+        let result = RealizationResult { outcome: Ok(3900.0), estimated_error: 1e-5, decay: 0.0 };
+        let solved = vec![result; usize::try_from(count).unwrap()];
+        evaluation.fill(Indices { first, count }, &solved, &WorkerName::new("node", 1, 1));
+    };
+    let pieces = |rig: &mut Rig| -> Vec<(u64, u64)> {
+        let effects = react(&mut rig.state, Event::Tick, rig.now);
+        let piece = |effect| match effect {
+            Effect::Store(Record::Piece { record, attempt }) => Some((record.first, attempt)),
+            _ => None,
+        };
+        effects.into_iter().filter_map(piece).collect()
+    };
+    fill(&mut rig, piece, piece - 1);
+    assert_eq!(pieces(&mut rig), []);
+    fill(&mut rig, 2 * piece - 1, 1);
+    let (attempt, being_stored) = {
+        let [(first, attempt)] = pieces(&mut rig)[..] else { panic!("not one piece") };
+        assert_eq!(first, piece);
+        let count = |rig: &Rig| rig.state.jobs[&JobId(1)].evaluation().unwrap().pieces.being_stored;
+        (attempt, count)
+    };
+    // Reports of another attempt do not count, and a failure is no reason to try again.
+    let error = || "the disk is full".to_owned();
+    for (key, left) in [(RecordKey::Piece(attempt + 1), 1), (RecordKey::Piece(attempt), 0)] {
+        let _ = react(
+            &mut rig.state,
+            Event::StoreFailed { job: JobId(1), key, error: error() },
+            rig.now,
+        );
+        assert_eq!(being_stored(&rig), left, "{key:?}");
+    }
+    assert_eq!(pieces(&mut rig), []);
+    fill(&mut rig, 2 * piece, piece);
+    assert_eq!(pieces(&mut rig), [(2 * piece, attempt)]);
+    let _ = react(&mut rig.state, stored(1, RecordKey::Piece(attempt)), rig.now);
+    assert_eq!(being_stored(&rig), 0);
 }

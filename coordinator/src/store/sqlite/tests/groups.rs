@@ -9,6 +9,7 @@ use crate::metrics::write_times::WriteTimes;
 use crate::store::group::{GROUP_RECORDS_MAX, Group};
 use crate::store::job_output::ReadRequest;
 use crate::store::thread::{StoreCommand, serve};
+use crate::store::{PIECE_OUTCOMES, PieceRecord};
 
 /// Records of every kind, none of which needs another of them; jobs 1 and 2 are stored before.
 fn records() -> Vec<Record> {
@@ -16,6 +17,9 @@ fn records() -> Vec<Record> {
         let record = evaluation(job, number);
         Record::Evaluation { record, is_last: number > 0 }
     };
+    let outcomes = super::evaluation(1, 4).outcomes;
+    let first = PIECE_OUTCOMES as u64;
+    let piece = PieceRecord { job: JobId(1), number: 4, first, outcomes };
     vec![
         evaluation(1, 0),
         Record::Job(job(3)),
@@ -26,6 +30,7 @@ fn records() -> Vec<Record> {
         Record::Job(job(5)),
         Record::Evaluations(vec![super::evaluation(1, 2), super::evaluation(1, 3)]),
         Record::Part(parts::part(1, 4)),
+        Record::Piece { record: piece, attempt: 7 },
     ]
 }
 
@@ -61,6 +66,7 @@ fn has(store: &mut SqliteStore, record: &Record) -> bool {
             store.evaluation(record.job, record.number).unwrap().as_ref() == Some(record)
         }),
         Record::Part(record) => store.parts(record.job).unwrap().contains(record),
+        Record::Piece { record, .. } => pieces::has(store, record),
         Record::End { end, summary } => {
             store.end(end.job).unwrap().as_ref() == Some(end)
                 && store.summary(end.job).unwrap().as_ref() == Some(summary)
@@ -103,6 +109,7 @@ impl Fault {
                         ("evaluation", format!("NEW.number = {}", records[0].number))
                     }
                     Record::Part(_) => ("part", "true".to_owned()),
+                    Record::Piece { .. } => ("piece", "true".to_owned()),
                     Record::End { .. } => ("summary", "true".to_owned()),
                     Record::Ban(_) => ("ban", "true".to_owned()),
                 };
@@ -125,6 +132,9 @@ impl Fault {
                     Record::Part(part) => {
                         let piece = &mut part.pieces[0];
                         piece.results = vec![piece.results[0]; 100_000];
+                    }
+                    Record::Piece { record, .. } => {
+                        record.outcomes = vec![Ok(3900.0); 100_000].into();
                     }
                     Record::End { end, .. } => end.ending.reason = Some(large),
                     Record::Ban(ban) => ban.reason = large,

@@ -1,9 +1,9 @@
 //! Large evaluations, whose outcomes are in several rows.
 
 use super::super::columns::{evaluation_checksum, pack_errors, pack_outcomes, pack_point};
-use super::super::evaluation_rows::PIECE_OUTCOMES;
 use super::super::opening::FORMAT;
 use super::*;
+use crate::store::{PIECE_OUTCOMES, PieceRecord};
 
 /// An evaluation with so many outcomes, of which some are failures.
 fn large(number: u64, count: usize) -> EvaluationRecord {
@@ -12,6 +12,22 @@ fn large(number: u64, count: usize) -> EvaluationRecord {
         _ => Ok(3000.0 + index as f64 / 64.0),
     };
     EvaluationRecord { outcomes: (0..count).map(outcome).collect(), ..evaluation(1, number) }
+}
+
+/// A piece of evaluation `number` of job 1, as in [`large`].
+fn piece(number: u64, first: usize) -> PieceRecord {
+    let all = large(number, first + PIECE_OUTCOMES).outcomes;
+    let outcomes = all[first..].to_vec().into();
+    PieceRecord { job: JobId(1), number, first: first as u64, outcomes }
+}
+
+/// Returns whether the store has a piece, as it is.
+pub(super) fn has(store: &SqliteStore, record: &PieceRecord) -> bool {
+    let sql = "SELECT outcomes FROM piece WHERE job = ?1 AND evaluation = ?2 AND first = ?3";
+    let of = params![record.job.0, record.number, record.first];
+    let found: Option<Vec<u8>> =
+        store.connection.query_row(sql, of, |row| row.get(0)).optional().unwrap();
+    found.is_some_and(|found| found == pack_outcomes(&record.outcomes, None))
 }
 
 fn store() -> (tempfile::TempDir, SqliteStore) {
@@ -77,6 +93,49 @@ fn pieces_go_with_their_evaluation() {
     store.finish_job(&end(1), &summary(1)).unwrap();
     store.delete_jobs(&[JobId(1)]).unwrap();
     assert_eq!(pieces(&store), [] as [i64; 0]);
+}
+
+#[test]
+fn pieces_that_are_stored_before_are_used_if_they_are_the_same() {
+    let (directory, mut store) = store();
+    let whole = large(0, 3 * PIECE_OUTCOMES + 5);
+    let same = piece(0, PIECE_OUTCOMES);
+    let other =
+        PieceRecord { outcomes: piece(0, PIECE_OUTCOMES).outcomes, ..piece(0, 2 * PIECE_OUTCOMES) };
+    for record in [&same, &other, &same] {
+        store.put_piece(record).unwrap();
+        assert!(has(&store, record));
+    }
+    // A process that is killed before the evaluation is complete leaves them.
+    drop(store);
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    let jobs = store.jobs().unwrap();
+    assert_eq!((jobs[0].evaluations, store.evaluation(JobId(1), 0).unwrap()), (0, None));
+    let row = |store: &SqliteStore, first: usize| {
+        let sql = format!("SELECT rowid FROM piece WHERE evaluation = 0 AND first = {first}");
+        rows(store, &sql)[0]
+    };
+    let before = row(&store, PIECE_OUTCOMES);
+    store.put_evaluation(&whole, true).unwrap();
+    assert_eq!(row(&store, PIECE_OUTCOMES), before, "it was written again");
+    assert!(store.evaluation(JobId(1), 0).unwrap().as_ref() == Some(&whole));
+    // What may be damaged is written again, though its checksum is that of the new record.
+    let sql = "UPDATE piece SET outcomes = zeroblob(9) WHERE first = 65536";
+    store.connection.execute(sql, []).unwrap();
+    store.evaluation(JobId(1), 0).unwrap_err();
+    store.put_evaluation(&whole, true).unwrap();
+    assert!(store.evaluation(JobId(1), 0).unwrap() == Some(whole));
+}
+
+#[test]
+fn a_job_that_ends_leaves_no_piece_without_an_evaluation() {
+    let (_directory, mut store) = store();
+    store.put_evaluation(&large(0, 2 * PIECE_OUTCOMES), true).unwrap();
+    let loose = piece(1, PIECE_OUTCOMES);
+    store.put_piece(&loose).unwrap();
+    assert!(has(&store, &loose));
+    store.finish_job(&end(1), &summary(1)).unwrap();
+    assert_eq!(rows(&store, "SELECT evaluation FROM piece"), [0]);
 }
 
 #[test]
