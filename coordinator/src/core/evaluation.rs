@@ -142,9 +142,7 @@ impl PendingEvaluation {
     /// Takes at most `most` indices from the front of the queue.
     pub fn take(&mut self, most: u64) -> Option<Indices> {
         let front = self.queue.front_mut()?;
-        let taken = Indices { first: front.first, count: front.count.min(most.max(1)) };
-        front.first += taken.count;
-        front.count -= taken.count;
+        let taken = front.take(most);
         if front.count == 0 {
             self.queue.pop_front();
         }

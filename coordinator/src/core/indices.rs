@@ -14,4 +14,12 @@ impl Indices {
     pub fn end(self) -> u64 {
         self.first + self.count
     }
+
+    /// Takes at most `most` indices, at least one, from the front; none may be left.
+    pub(crate) fn take(&mut self, most: u64) -> Self {
+        let taken = Self { first: self.first, count: self.count.min(most.max(1)) };
+        self.first += taken.count;
+        self.count -= taken.count;
+        taken
+    }
 }

@@ -16,7 +16,7 @@
 use std::collections::BTreeSet;
 
 use crate::core::batch::{Assignment, Purpose};
-use crate::core::ids::WorkerId;
+use crate::core::ids::{BatchId, WorkerId};
 use crate::core::job::Job;
 use crate::core::reactor::turn::Turn;
 
@@ -33,18 +33,6 @@ mod schedule;
 pub(super) mod sizing;
 pub(super) mod speculation;
 
-/// Maximum number of batches of unknown duration that are sent after one event. The other workers get theirs
-/// after the next events. By then some may have answered, and it is known how large a batch should be.
-const UNKNOWN_AT_ONCE: usize = 256;
-
-/// A batch or check that was sent.
-enum Sent {
-    /// A check, a batch for a worker on probation, or one whose duration can be estimated.
-    Known,
-    /// A batch whose duration is unknown: neither its worker nor enough others have answered.
-    Unknown,
-}
-
 /// Sends batches while workers can accept more and work waits, then duplicates.
 pub(crate) fn dispatch(turn: &mut Turn) {
     if turn.state.draining {
@@ -52,14 +40,8 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     }
     let mut kept = poison::dispatch(turn);
     overdue::dispatch(turn, &mut kept);
-    let mut unknown = 0;
-    while unknown < UNKNOWN_AT_ONCE && schedule::work_waits(turn.state) {
-        match hand_one(turn, &kept) {
-            Some(Sent::Known) => {}
-            Some(Sent::Unknown) => unknown += 1,
-            None => break,
-        }
-    }
+    sizing::forget_unknown(turn.state, turn.now);
+    while schedule::work_waits(turn.state) && hand_one(turn, &kept) {}
     duplicates::duplicate_late_batches(turn);
     if kept.is_empty() && !schedule::work_waits(turn.state) {
         idle::dispatch(turn);
@@ -67,40 +49,42 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     duplicates::duplicate_slow_batches(turn);
 }
 
-/// Sends one check or batch to the first free worker that is eligible for it; `None` if there is none.
-/// The workers in `kept` receive nothing.
-fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> Option<Sent> {
-    let first = schedule::free_workers(turn.state, kept).next()?;
+/// Sends one check or batch to the first free worker that is eligible for it; returns whether there is
+/// one. The workers in `kept` receive nothing.
+fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
+    let Some(first) = schedule::free_workers(turn.state, kept).next() else {
+        return false;
+    };
     let is_sound =
         |worker| turn.state.workers.get(&worker).is_some_and(|it| turn.state.is_sound(it));
     if !schedule::checks_wait(turn.state) && is_sound(first) {
         // Without checks, all sound workers are eligible for the same batches, so the first is
         // enough.
-        return hand_batch(turn, first);
+        return hand_batch(turn, first).is_some();
     }
     let free: Vec<WorkerId> = schedule::free_workers(turn.state, kept).collect();
-    free.into_iter().find_map(|worker| {
-        if audits::hand_check(turn, worker) {
-            return Some(Sent::Known);
-        }
-        hand_batch(turn, worker)
-    })
+    free.into_iter()
+        .any(|worker| audits::hand_check(turn, worker) || hand_batch(turn, worker).is_some())
 }
 
-/// Sends a worker a batch of the job that is next in turn.
-fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<Sent> {
-    let job = schedule::next_job(turn.state)?;
+/// Sends a worker a batch of the job that is next in turn; `None` if it gets none now.
+fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
+    let job = schedule::next_job_that_may(turn.state, |job| !sizing::must_wait(job))?;
     let (attempt, queued) = turn.state.jobs.get(&job).and_then(next_evaluation)?;
     let attached = turn.state.workers.get(&worker)?;
-    let mut sent = Sent::Known;
     let size = if turn.state.is_sound(attached) {
         let fleet = sizing::fleet_rate(turn.state, job);
         let attached = turn.state.workers.get(&worker)?;
-        if sizing::rate(attached, job, fleet).is_none() {
-            sent = Sent::Unknown;
-        }
+        let is_unknown = sizing::rate(attached, job, fleet).is_none();
         let further = turn.state.jobs.get(&job).map_or(0, ahead::left);
-        sizing::batch_size(turn.state, attached, job, fleet, (queued, further))
+        if !attached.in_flight.is_empty()
+            && sizing::is_one_batch_each(turn.state, attached, job, fleet, further)
+        {
+            return None;
+        }
+        let size = sizing::batch_size(turn.state, attached, job, fleet, (queued, further));
+        turn.state.jobs.get_mut(&job)?.unknown_sent += usize::from(is_unknown);
+        size
     } else if !turn.state.probation.is_paused(&attached.name, turn.now)
         || !turn.state.answers_batches(|_| true)
     {
@@ -114,11 +98,9 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<Sent> {
     turn.state.last_served = Some(job);
     ahead::refresh(turn, job);
     let assignment = Assignment { job, attempt, indices };
-    let batch = batches::send(turn, worker, assignment, Purpose::Fill);
-    if let Some(batch) = batch {
-        batches::charge(turn.state, batch);
-    }
-    Some(sent)
+    let batch = batches::send(turn, worker, assignment, Purpose::Fill)?;
+    batches::charge(turn.state, batch);
+    Some(batch)
 }
 
 /// Returns the attempt at the evaluation of a job whose realizations are sent next, with the number of

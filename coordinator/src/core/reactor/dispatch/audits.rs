@@ -1,6 +1,6 @@
 //! Chooses the workers for audits and tie-breakers.
 
-use super::{batches, poison};
+use super::{batches, poison, schedule, sizing};
 use crate::core::batch::{Assignment, Purpose};
 use crate::core::dispute::Dispute;
 use crate::core::evaluation::Audit;
@@ -24,7 +24,7 @@ pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
         if on_probation {
             continue;
         }
-        if let Some((audit, attempt)) = audit_for(turn.state, job, &name) {
+        if let Some((audit, attempt)) = audit_for(turn.state, job, worker, &name) {
             let assignment = Assignment { job, attempt, indices: audit.indices };
             let purpose = Purpose::Audit { lost: audit.lost };
             batches::send(turn, worker, assignment, purpose);
@@ -34,17 +34,34 @@ pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
     false
 }
 
-/// Takes the first audit of a job's evaluations that this worker may compute; returns it with the
-/// attempt at the evaluation.
-fn audit_for(state: &mut State, job: JobId, name: &WorkerName) -> Option<(Audit, u64)> {
+/// Takes the first audit of a job's evaluations that this worker may compute, or a part of it if nothing
+/// else is left to send; returns it with the attempt at the evaluation.
+fn audit_for(
+    state: &mut State,
+    job: JobId,
+    worker: WorkerId,
+    name: &WorkerName,
+) -> Option<(Audit, u64)> {
     let of_others = |audit: &Audit| audit.by != *name;
-    let mut evaluations = state.jobs.get_mut(&job)?.certain_mut();
-    evaluations.find_map(|evaluation| {
+    let (attempt, at, audited) = state.jobs.get(&job)?.certain().find_map(|evaluation| {
         let at = evaluation.audits.iter().position(of_others)?;
-        let audit = evaluation.audits.remove(at)?;
-        evaluation.audits_out += 1;
-        Some((audit, evaluation.attempt))
-    })
+        Some((evaluation.attempt, at, evaluation.audits.get(at)?.indices.count))
+    })?;
+    let most = if schedule::next_job(state).is_some() {
+        audited
+    } else {
+        let fleet = sizing::fleet_rate(state, job);
+        sizing::audit_size(state.workers.get(&worker)?, job, fleet, audited)
+    };
+    let mut evaluations = state.jobs.get_mut(&job)?.certain_mut();
+    let evaluation = evaluations.find(|evaluation| evaluation.attempt == attempt)?;
+    evaluation.audits_out += 1;
+    let audit = evaluation.audits.get_mut(at)?;
+    let part = Audit { indices: audit.indices.take(most), ..audit.clone() };
+    if audit.indices.count == 0 {
+        evaluation.audits.remove(at);
+    }
+    Some((part, attempt))
 }
 
 /// Returns the first dispute of a job that this worker shall decide: one for which no eligible

@@ -9,6 +9,8 @@
 //! then the coordinator serves one worker after the other before the first is idle again. If there are
 //! enough workers for one such batch each, R is the time of the whole evaluation: all batches are equal.
 
+use std::time::Duration;
+
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
 use crate::core::ids::JobId;
@@ -29,6 +31,12 @@ const WORTH_S: f64 = 0.02;
 /// Number of workers that must have computed something of a job before it is known how fast one of the
 /// others may be.
 const KNOWN_MIN: u64 = 8;
+/// Maximum number of batches of a job that are sent within [`UNKNOWN_TIME`] although nobody knows how long they
+/// take. The other workers get theirs after later events. By then some may have answered, and it is known
+/// how large a batch should be.
+const UNKNOWN_AT_ONCE: usize = 256;
+/// Time in which so many are sent and, if they are short, answered.
+const UNKNOWN_TIME: Duration = Duration::from_millis(25);
 /// Number of batches for which the rate of a fleet is used at least.
 const USES_MIN: u64 = 32;
 
@@ -59,9 +67,8 @@ pub(crate) fn batch_size(
     let left = (queued + further) as f64;
     let share = left * (weight / fleet.total.max(weight));
     let workers = state.workers.len();
-    let all =
-        state.jobs.get(&job).map_or(0, |job| job.record.specification.monte_carlo.realizations);
-    let worth_s = rate.map_or(WORTH_S, |rate| worth_s(left / rate, all as f64 / rate, workers));
+    let all = realizations(state, job);
+    let worth_s = rate.map_or(WORTH_S, |rate| worth_s(left / rate, all / rate, workers));
     let worth = rate.map_or(0.0, |rate| (worth_s * rate).min(left));
     let target_s = state.config.batch_target.as_secs_f64();
     // As long as nothing is known, one for each slot takes no longer than fewer.
@@ -78,6 +85,57 @@ pub(crate) fn batch_size(
     if further == 0 { size } else { queued.div_ceil(queued.div_ceil(size).max(1)) }
 }
 
+/// Returns whether there are enough workers for one batch of an evaluation of `job` each. Then one that
+/// `attached` gets while it still holds another would be complete later than on an idle worker, of which
+/// there will be some. With several jobs, or evaluations in several chains, workers hold batches of others
+/// and are not waited for.
+pub(crate) fn is_one_batch_each(
+    state: &State,
+    attached: &AttachedWorker,
+    job: JobId,
+    fleet: FleetRate,
+    further: u64,
+) -> bool {
+    let suffice = |rate| suffice(state.workers.len(), realizations(state, job) / rate);
+    further == 0 && state.active.len() == 1 && rate(attached, job, fleet).is_some_and(suffice)
+}
+
+/// Returns the number of realizations of an audit that a worker gets at once, when nothing else waits: an
+/// evaluation waits for its last audits, and many workers compute them together sooner than one.
+pub(crate) fn audit_size(
+    attached: &AttachedWorker,
+    job: JobId,
+    fleet: FleetRate,
+    audited: u64,
+) -> u64 {
+    let of = |rate: f64| (rate * best_s(audited as f64 / rate)).ceil() as u64;
+    let size = rate(attached, job, fleet).map_or(audited, of);
+    size.max(attached.hello.slots.into()).min(audited)
+}
+
+/// Returns the number of realizations of an evaluation of a job.
+fn realizations(state: &State, id: JobId) -> f64 {
+    let job = state.jobs.get(&id);
+    job.map_or(0, |job| job.record.specification.monte_carlo.realizations) as f64
+}
+
+/// Returns whether a job must wait until it is known how large its batches should be: so many were sent that
+/// there may soon be answers.
+pub(crate) fn must_wait(job: &Job) -> bool {
+    job.unknown_sent >= UNKNOWN_AT_ONCE && job.rated_workers < KNOWN_MIN
+}
+
+/// Lets jobs send batches of unknown duration again after a while without answers.
+pub(crate) fn forget_unknown(state: &mut State, now: Duration) {
+    for id in &state.active {
+        if let Some(job) = state.jobs.get_mut(id)
+            && now.saturating_sub(job.unknown_since) >= UNKNOWN_TIME
+        {
+            (job.unknown_since, job.unknown_sent) = (now, 0);
+        }
+    }
+}
+
 /// Returns the rate of a worker at a job, as measured, or that of its slots in the mean of the others if
 /// enough of them are known.
 pub(crate) fn rate(attached: &AttachedWorker, job: JobId, fleet: FleetRate) -> Option<f64> {
@@ -91,9 +149,19 @@ pub(crate) fn rate(attached: &AttachedWorker, job: JobId, fleet: FleetRate) -> O
 /// Otherwise they become smaller, so that all workers finish together.
 fn worth_s(left_s: f64, all_s: f64, workers: usize) -> f64 {
     let round_s = workers as f64 * BATCH_COST_S;
-    let best = |seconds: f64| (seconds * BATCH_COST_S).sqrt();
-    let basis_s = if all_s <= best(all_s) * workers as f64 { all_s.max(left_s) } else { left_s };
-    best(basis_s).min(round_s.max(WORTH_S))
+    let basis_s = if suffice(workers, all_s) { all_s.max(left_s) } else { left_s };
+    best_s(basis_s).min(round_s.max(WORTH_S))
+}
+
+/// Returns whether workers suffice for one batch each of an evaluation that takes one of them this time, s.
+fn suffice(workers: usize, all_s: f64) -> bool {
+    all_s <= best_s(all_s) * workers as f64
+}
+
+/// Returns the time of the batches that make the sum of their time and their cost shortest, s, given the
+/// time of all that is left.
+fn best_s(left_s: f64) -> f64 {
+    (left_s * BATCH_COST_S).sqrt()
 }
 
 /// Returns the number of batches that the coordinator serves within some time, s.

@@ -1,6 +1,9 @@
 //! Comparison of answers: audits, disputes, bans.
 
 use super::*;
+use crate::core::batch::Purpose;
+use crate::core::indices::Indices;
+use crate::core::job::Stage;
 
 /// Returns a rig with a propagation of so many realizations and workers 1, 2, … of one thread, each
 /// on a host of its own; every batch is audited.
@@ -33,6 +36,31 @@ fn an_audited_batch_is_computed_by_another_worker() {
     // Worker 1 has the only realization; worker 2 gets its audit when it is answered.
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
     rig.check(answer(2, 2, 0, 1), &["store job 1 evaluation 0"]);
+}
+
+/// When nothing else is left to send, an audit is computed in parts, so that many workers share it.
+#[test]
+fn a_last_audit_is_computed_in_parts() {
+    let mut rig = rig(200, 2);
+    for worker in rig.state.workers.values_mut() {
+        worker.rates.insert(JobId(1), 1e5);
+    }
+    let (mut filled, mut audits) = (Vec::new(), Vec::new());
+    while let Some((&BatchId(id), batch)) = rig.state.batches.first_key_value() {
+        let (Indices { first, count }, worker) = (batch.assignment.indices, batch.worker.0);
+        match batch.purpose {
+            Purpose::Audit { .. } => audits.push((first, count)),
+            _ => filled.push((first, count)),
+        }
+        rig.event(answer_in(count as f64 / 1e5, worker, id, first, count));
+    }
+    assert!(audits.len() > filled.len(), "{filled:?} {audits:?}");
+    // Each realization is audited once.
+    audits.sort_unstable();
+    let ends = audits.iter().map(|(first, count)| first + count);
+    let begins = audits.iter().skip(1).map(|(first, _)| *first);
+    assert!(ends.eq(begins.chain([200])), "{audits:?}");
+    assert!(matches!(rig.state.jobs[&JobId(1)].stage, Stage::StoringEvaluation { .. }));
 }
 
 #[test]

@@ -133,9 +133,9 @@ fn each_of_many_workers_is_tried_with_one_batch() {
     assert_eq!([16, 17].map(|worker| held(&rig, worker)), [2; 2]);
 }
 
-/// As long as no worker has answered, at most 256 batches are sent after an event, although six hundred
-/// workers are free. When eight have answered, the speed of the others is estimated, and they get
-/// larger batches.
+/// As long as no worker has answered, at most 256 batches are sent in 25 ms, although six hundred workers
+/// are free. When eight have answered, the speed of the others is estimated, and they get larger
+/// batches.
 #[test]
 fn a_job_on_many_workers_begins_with_few_batches_of_unknown_duration() {
     let mut rig = Rig::new();
@@ -155,11 +155,55 @@ fn a_job_on_many_workers_begins_with_few_batches_of_unknown_duration() {
     // 8 in 4 ms are 2000 per second.
     for batch in 1..8 {
         let first = 8 * (batch - 1);
-        let sent = sends(answer_in(0.004, batch, batch, first, 8));
-        assert!(sent.iter().filter(|count| **count == 8).count() <= 256, "{batch}: {sent:?}");
+        assert_eq!(sends(answer_in(0.004, batch, batch, first, 8)), [0; 0], "{batch}");
     }
     let sent = sends(answer_in(0.004, 8, 8, 56, 8));
     assert!(!sent.is_empty() && sent.iter().all(|count| *count > 100), "{sent:?}");
+}
+
+/// Realizations may be so slow that nobody answers soon: then the other workers do not wait for it. Nor does
+/// another job.
+#[test]
+fn workers_do_not_wait_for_long_until_the_duration_of_a_batch_is_known() {
+    let mut rig = Rig::new();
+    for worker in 1..=600 {
+        rig.event(hello(worker, 2));
+    }
+    let sends = |rig: &mut Rig, event| {
+        rig.event(event).iter().filter(|effect| effect.starts_with("send ")).count()
+    };
+    rig.event(submit(1, "", propagation(1_000_000)));
+    assert_eq!(sends(&mut rig, stored(1, RecordKey::Job)), 256);
+    rig.now += Duration::from_millis(20);
+    assert_eq!(sends(&mut rig, Event::Tick), 0);
+    rig.event(submit(2, "", propagation(16)));
+    assert_ne!(sends(&mut rig, stored(2, RecordKey::Job)), 0);
+    rig.now += Duration::from_millis(5);
+    assert_eq!(sends(&mut rig, Event::Tick), 256);
+}
+
+/// If there are enough workers for one batch of an evaluation each, none gets a second one that an idle worker
+/// would soon compute.
+#[test]
+fn a_worker_gets_no_second_batch_if_there_are_enough_workers() {
+    let mut rig = Rig::new();
+    for worker in 1..=320 {
+        rig.event(hello(worker, 2));
+    }
+    rig.event(submit(1, "", propagation(20_000)));
+    rig.event(stored(1, RecordKey::Job));
+    let mut sent = Vec::new();
+    for batch in 1..=8 {
+        sent.extend(rig.event(answer_in(0.004, batch, batch, 8 * (batch - 1), 8)));
+    }
+    // The eight that have answered, and those that had nothing yet.
+    assert_eq!(sent.len(), 8 + 320 - 256, "{sent:?}");
+    let in_flight = rig.state.workers.values().map(|worker| worker.in_flight.len());
+    assert_eq!(in_flight.collect::<Vec<_>>(), [1; 320]);
+    let queued = rig.state.jobs[&JobId(1)].evaluation().unwrap().queued();
+    assert!(queued > 10_000, "{queued}");
+    let sent = rig.event(answer_in(0.004, 9, 9, 64, 8));
+    assert!(sent.len() == 1 && sent[0].starts_with("send 9: "), "{sent:?}");
 }
 
 #[test]
