@@ -45,9 +45,13 @@ fn duplicate(
             return;
         }
         // Those that hold least come first; the duplicate makes the worker busy.
-        let first = state.order.iter().next().filter(|place| !place.on_probation && idle(place));
+        let first = state.order.iter().next();
+        let Some(idle) = first.filter(|place| !place.on_probation && idle(place)) else {
+            return;
+        };
+        // Now that a worker is idle, a walk over all batches costs nobody anything.
         let is_worth = |(_, batch): &(BatchId, &Batch)| old(batch, now) && worth(state, batch);
-        let (Some(idle), Some((slowest, _))) = (first, open(state).find(is_worth)) else {
+        let Some((slowest, _)) = open(state).find(is_worth) else {
             return;
         };
         if send(turn, slowest, idle.worker).is_none() {
