@@ -8,18 +8,16 @@ use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::results::EstimatedError;
 
-use self::pieces::SentPieces;
 use self::results::Results;
+use self::sent_pieces::SentPieces;
 use crate::core::crashes::{Crashes, LostWorker};
 use crate::core::dispute::{self, Dispute, Vote};
 use crate::core::indices::Indices;
 use crate::core::worker_name::WorkerName;
 use crate::store::PartPiece;
 
-mod pieces;
 mod results;
-
-pub(crate) use self::pieces::take_pieces;
+mod sent_pieces;
 
 /// A batch that is to be computed a second time by another worker.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,11 +9,11 @@ use std::time::Duration;
 use osteon_common::parameters::{PARAMETERS, Point};
 
 use crate::core::audit::{self, AuditKey};
-use crate::core::evaluation::{Audit, PendingEvaluation};
+use crate::core::evaluation::{Audit, PendingEvaluation, StoredRecord};
 use crate::core::ids::JobId;
 use crate::core::indices::Indices;
 use crate::core::worker_name::WorkerName;
-use crate::store::{PartPiece, PartRecord};
+use crate::store::{PIECE_OUTCOMES, PartPiece, PartRecord, PieceRecord};
 
 /// Results are saved when they, or their evaluation, are this old.
 pub(crate) const SAVE_AFTER: Duration = Duration::from_millis(1500);
@@ -99,6 +99,27 @@ pub(crate) fn take_unsaved(
     (!pieces.is_empty()).then_some(PartRecord { job, point, pieces })
 }
 
+/// Returns pieces of an evaluation that have all their outcomes and were not sent before, as records; none for
+/// one whose number has a record already, which they would damage. The record of the evaluation has them
+/// too, but whoever waits for it then waits only for the rest.
+pub(crate) fn take_pieces(
+    evaluation: &mut PendingEvaluation,
+    job: JobId,
+    with_decays: bool,
+) -> Vec<PieceRecord> {
+    if evaluation.stored != StoredRecord::Missing {
+        return Vec::new();
+    }
+    let sent = evaluation.pieces.send(evaluation.results.full_pieces());
+    let taken = sent.into_iter().filter_map(|piece| {
+        let first = piece * PIECE_OUTCOMES;
+        let outcomes =
+            evaluation.results.outcomes_in(first..first + PIECE_OUTCOMES, with_decays)?;
+        Some(PieceRecord { job, number: evaluation.number, first: first as u64, outcomes })
+    });
+    taken.collect()
+}
+
 /// Takes the first `most` indices.
 fn take_first(of: &mut Vec<Indices>, most: u64) -> Vec<Indices> {
     let mut left = most;
@@ -119,6 +140,9 @@ fn take_first(of: &mut Vec<Indices>, most: u64) -> Vec<Indices> {
 
 #[cfg(test)]
 mod tests {
+    use osteon_common::outcome::RealizationResult;
+    use osteon_common::outcomes::Outcomes;
+
     use super::*;
 
     #[test]
@@ -139,5 +163,51 @@ mod tests {
             assert_eq!(take_first(&mut of, most), indices(taken), "{most}");
             assert_eq!(of, indices(left), "{most}");
         }
+    }
+    const PIECE: u64 = PIECE_OUTCOMES as u64;
+
+    fn result(index: u64) -> RealizationResult {
+        RealizationResult { outcome: Ok(3000.0 + index as f64), estimated_error: 1e-5, decay: 0.0 }
+    }
+
+    fn fill(evaluation: &mut PendingEvaluation, first: u64, count: u64) {
+        let solved: Vec<_> = (first..first + count).map(result).collect();
+        evaluation.fill(Indices { first, count }, &solved, &WorkerName::new("node", 1, 2));
+    }
+
+    /// Returns the numbers of the pieces that are taken, and checks what is in them.
+    fn taken(evaluation: &mut PendingEvaluation) -> Vec<u64> {
+        let pieces = take_pieces(evaluation, JobId(5), false);
+        for piece in &pieces {
+            assert_eq!((piece.job, piece.number), (JobId(5), 3));
+            let expected: Outcomes =
+                (piece.first..piece.first + PIECE).map(|index| result(index).outcome).collect();
+            assert!(piece.outcomes == expected, "other outcomes from {}", piece.first);
+        }
+        pieces.iter().map(|piece| piece.first / PIECE).collect()
+    }
+
+    #[test]
+    fn full_pieces_are_taken_once() {
+        let mut evaluation = PendingEvaluation::new(3, 7, Point::of_bone([1.0; 7]), 4 * PIECE + 9);
+        fill(&mut evaluation, 0, 2 * PIECE - 1);
+        fill(&mut evaluation, 3 * PIECE, PIECE);
+        assert_eq!(taken(&mut evaluation), [3]);
+        fill(&mut evaluation, 2 * PIECE - 1, PIECE);
+        assert_eq!(taken(&mut evaluation), [1]);
+        // What is filled already counts once.
+        fill(&mut evaluation, 2 * PIECE - 1, PIECE);
+        assert_eq!(taken(&mut evaluation), [0; 0]);
+        // The last one is not full.
+        fill(&mut evaluation, 3 * PIECE - 1, PIECE + 10);
+        assert_eq!(taken(&mut evaluation), [2]);
+    }
+
+    #[test]
+    fn a_record_that_is_there_is_not_touched() {
+        let mut evaluation = PendingEvaluation::new(3, 7, Point::of_bone([1.0; 7]), 3 * PIECE);
+        evaluation.stored = StoredRecord::Damaged;
+        fill(&mut evaluation, 0, 3 * PIECE);
+        assert_eq!(taken(&mut evaluation), [0; 0]);
     }
 }

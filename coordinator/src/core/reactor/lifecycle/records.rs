@@ -107,7 +107,7 @@ fn forget_piece(stage: &mut Stage, of_attempt: u64) {
     if let Stage::Computing(PendingEvaluation { attempt, pieces, .. }) = stage
         && *attempt == of_attempt
     {
-        pieces.being_stored = pieces.being_stored.saturating_sub(1);
+        pieces.reported();
     }
 }
 

@@ -5,7 +5,6 @@ use std::time::Duration;
 use super::{jobs, records, workers};
 use crate::core::close_reason::CloseReason;
 use crate::core::effect::{Effect, Record};
-use crate::core::evaluation::take_pieces;
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::{Stage, sequence};
 use crate::core::reactor::dispatch::poison;
@@ -141,7 +140,7 @@ pub(crate) fn store_pieces(turn: &mut Turn) {
         // Others may get another number.
         if let Stage::Computing(evaluation) = &mut job.stage {
             let attempt = evaluation.attempt;
-            let pieces = take_pieces(evaluation, *id, job.search.has_decays()).into_iter();
+            let pieces = saved::take_pieces(evaluation, *id, job.search.has_decays()).into_iter();
             let stored = pieces.map(|record| Effect::Store(Record::Piece { record, attempt }));
             turn.effects.extend(stored);
         }

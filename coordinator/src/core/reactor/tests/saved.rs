@@ -179,7 +179,8 @@ fn full_pieces_of_a_large_evaluation_are_stored_before_it_is_complete() {
     let (attempt, being_stored) = {
         let [(first, attempt)] = pieces(&mut rig)[..] else { panic!("not one piece") };
         assert_eq!(first, piece);
-        let count = |rig: &Rig| rig.state.jobs[&JobId(1)].evaluation().unwrap().pieces.being_stored;
+        let count =
+            |rig: &Rig| rig.state.jobs[&JobId(1)].evaluation().unwrap().pieces.being_stored();
         (attempt, count)
     };
     // Reports of another attempt do not count, and a failure is no reason to try again.
