@@ -62,6 +62,7 @@ impl Completion {
             gathered(Gathered { job, attempt, record, is_last });
             (estimated_error, assessed.join().unwrap_or_else(|panic| resume_unwind(panic)))
         });
+        drop(evaluation);
         after.anticipate(assessment);
         after.tell(outcomes, estimated_error);
         Some(Completed { job, attempt, after })

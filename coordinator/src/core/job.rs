@@ -159,6 +159,8 @@ impl Job {
 pub(crate) struct FleetRate {
     /// Sum over the workers that are expected to answer, realizations per second.
     pub(crate) total: f64,
+    /// Number of workers that are expected to answer.
+    pub(crate) workers: usize,
     /// Mean of one slot, realizations per second.
     pub(crate) per_slot: f64,
     /// [`Job::rated_workers`] when it was measured.

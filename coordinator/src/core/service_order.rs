@@ -55,6 +55,12 @@ impl ServiceOrder {
         self.order.range(place(0)..=place(u64::MAX)).map(|place| place.worker)
     }
 
+    /// Returns the workers on probation that can accept more, in ascending order.
+    pub(crate) fn on_probation(&self) -> impl Iterator<Item = WorkerId> + '_ {
+        let first = ServicePlace { on_probation: true, held: 0, in_flight: 0, worker: WorkerId(0) };
+        self.order.range(first..).map(|place| place.worker)
+    }
+
     /// Gives a worker its place, or none.
     pub(crate) fn put(&mut self, worker: WorkerId, place: Option<ServicePlace>) {
         let before = match place {

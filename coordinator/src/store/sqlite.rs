@@ -382,7 +382,6 @@ impl Store for &SqliteStore {
         self.change(|connection| {
             connection.execute(sql, values)?;
             summary::put(connection, record.job, summary)?;
-            evaluation_rows::delete_loose_pieces(connection, record.job)?;
             self.stale.borrow_mut().add_of(connection, record.job)
         })
     }

@@ -16,7 +16,7 @@
 use std::collections::BTreeSet;
 
 use crate::core::batch::{Assignment, Purpose};
-use crate::core::ids::{BatchId, WorkerId};
+use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::Job;
 use crate::core::reactor::turn::Turn;
 
@@ -42,6 +42,10 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     overdue::dispatch(turn, &mut kept);
     sizing::forget_unknown(turn.state, turn.now);
     while schedule::work_waits(turn.state) && hand_one(turn, &kept) {}
+    if schedule::next_job(turn.state).is_some() {
+        // What waits is sent soon, and nothing is sent twice meanwhile.
+        return;
+    }
     duplicates::duplicate_late_batches(turn);
     if kept.is_empty() && !schedule::work_waits(turn.state) {
         idle::dispatch(turn);
@@ -49,40 +53,49 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     duplicates::duplicate_slow_batches(turn);
 }
 
-/// Sends one check or batch to the first free worker that is eligible for it; returns whether there is
-/// one. The workers in `kept` receive nothing.
+/// Sends one check or batch to the first free worker that gets one; returns whether there is one. The
+/// workers in `kept` receive nothing.
 fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
     let Some(first) = schedule::free_workers(turn.state, kept).next() else {
         return false;
     };
+    if hand(turn, first) {
+        return true;
+    }
     let is_sound =
         |worker| turn.state.workers.get(&worker).is_some_and(|it| turn.state.is_sound(it));
-    if !schedule::checks_wait(turn.state) && is_sound(first) {
-        // Without checks, all sound workers are eligible for the same batches, so the first is
-        // enough.
-        return hand_batch(turn, first).is_some();
-    }
-    let free: Vec<WorkerId> = schedule::free_workers(turn.state, kept).collect();
-    free.into_iter()
-        .any(|worker| audits::hand_check(turn, worker) || hand_batch(turn, worker).is_some())
+    let others: Vec<WorkerId> = if !schedule::checks_wait(turn.state) && is_sound(first) {
+        // Other sound workers hold as much, and without checks get nothing either.
+        turn.state.order.on_probation().filter(|worker| !kept.contains(worker)).collect()
+    } else {
+        schedule::free_workers(turn.state, kept).skip(1).collect()
+    };
+    others.into_iter().any(|worker| hand(turn, worker))
+}
+
+/// Sends a worker a check or a batch; returns whether it gets one.
+fn hand(turn: &mut Turn, worker: WorkerId) -> bool {
+    (schedule::checks_wait(turn.state) && audits::hand_check(turn, worker))
+        || hand_batch(turn, worker).is_some()
 }
 
 /// Sends a worker a batch of the job that is next in turn; `None` if it gets none now.
 fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
-    let job = schedule::next_job_that_may(turn.state, |job| !sizing::must_wait(job))?;
-    let (attempt, queued) = turn.state.jobs.get(&job).and_then(next_evaluation)?;
     let attached = turn.state.workers.get(&worker)?;
+    let may = |id: JobId, job: &Job| attached.rates.contains_key(&id) || !sizing::must_wait(job);
+    let job = schedule::next_job_that_may(turn.state, may)?;
+    let (attempt, queued) = turn.state.jobs.get(&job).and_then(next_evaluation)?;
     let size = if turn.state.is_sound(attached) {
         let fleet = sizing::fleet_rate(turn.state, job);
         let attached = turn.state.workers.get(&worker)?;
-        let is_unknown = sizing::rate(attached, job, fleet).is_none();
         let further = turn.state.jobs.get(&job).map_or(0, ahead::left);
-        if !attached.in_flight.is_empty()
-            && sizing::is_one_batch_each(turn.state, attached, job, fleet, further)
-        {
+        let size = sizing::batch_size(turn.state, attached, job, fleet, (queued, further));
+        // A speculative batch gives way.
+        let is_busy = turn.state.order.place(worker).is_some_and(|place| place.held > 0);
+        if is_busy && sizing::is_one_batch_each(turn.state, attached, job, fleet, size) {
             return None;
         }
-        let size = sizing::batch_size(turn.state, attached, job, fleet, (queued, further));
+        let is_unknown = sizing::rate(attached, job, fleet).is_none();
         turn.state.jobs.get_mut(&job)?.unknown_sent += usize::from(is_unknown);
         size
     } else if !turn.state.probation.is_paused(&attached.name, turn.now)

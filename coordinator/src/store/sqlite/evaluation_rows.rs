@@ -65,8 +65,8 @@ fn delete(connection: &Connection, job: JobId, number: u64) -> rusqlite::Result<
     Ok(())
 }
 
-/// Adds the pieces of an evaluation that are not there. Returns their checksums. Those that are there are as
-/// many at most, since all evaluations of a job have as many outcomes.
+/// Adds the pieces of an evaluation that are not there. Returns their checksums. There can be none beyond its
+/// last one, since all evaluations of a job have as many outcomes.
 fn put_pieces(connection: &Connection, record: &EvaluationRecord) -> rusqlite::Result<Vec<u8>> {
     let (job, number, count) = (record.job, record.number, record.outcomes.len());
     let mut checksums = Vec::new();
@@ -115,12 +115,33 @@ pub(super) fn delete_after(
     Ok(())
 }
 
-/// Deletes the pieces of a job that belong to no evaluation.
-pub(super) fn delete_loose_pieces(connection: &Connection, job: JobId) -> rusqlite::Result<()> {
-    let sql = "DELETE FROM piece WHERE job = ?1 AND NOT EXISTS (SELECT 1 FROM evaluation
-               WHERE evaluation.job = ?1 AND evaluation.number = piece.evaluation)";
-    connection.prepare(sql)?.execute(params![job.0]).map(drop)
+/// Deletes the pieces that belong to no evaluation: a process that was killed may have left them. They would
+/// be written again soon, and could be damaged by then.
+pub(super) fn delete_loose_pieces(connection: &Connection) -> rusqlite::Result<()> {
+    connection.execute_batch(
+        "DELETE FROM piece WHERE NOT EXISTS (SELECT 1 FROM evaluation
+         WHERE evaluation.job = piece.job AND evaluation.number = piece.evaluation)",
+    )
 }
+
+/// Returns whether a job has pieces that belong to no evaluation.
+pub(super) fn has_loose_pieces(connection: &Connection, job: JobId) -> rusqlite::Result<bool> {
+    connection.prepare(&format!("SELECT 1 {LOOSE}"))?.exists(params![job.0])
+}
+
+/// Deletes at most so many of them; returns their number.
+pub(super) fn delete_some_loose_pieces(
+    connection: &Connection,
+    job: JobId,
+    most: usize,
+) -> rusqlite::Result<usize> {
+    let sql = format!("DELETE FROM piece WHERE rowid IN (SELECT rowid {LOOSE} LIMIT ?2)");
+    connection.prepare(&sql)?.execute(params![job.0, most])
+}
+
+/// Selects the pieces of a job that belong to no evaluation.
+const LOOSE: &str = "FROM piece WHERE job = ?1 AND NOT EXISTS (SELECT 1 FROM evaluation
+                     WHERE evaluation.job = ?1 AND evaluation.number = piece.evaluation)";
 
 /// Returns the outcomes of a row, from this index on.
 fn packed(record: &EvaluationRecord, first: usize) -> Vec<u8> {

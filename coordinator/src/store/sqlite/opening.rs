@@ -213,6 +213,7 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
     transaction.execute("UPDATE format SET version = ?1 WHERE version = ?2", [FORMAT, FORMER])?;
     transaction.execute_batch(parts::TABLE)?;
     parts::delete_of_ended(&transaction)?;
+    evaluation_rows::delete_loose_pieces(&transaction)?;
     transaction.commit()
 }
 

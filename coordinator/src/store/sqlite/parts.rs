@@ -11,6 +11,7 @@ use rusqlite::{Connection, params};
 use super::columns::{
     checksum, pack_point, pack_worker, unpack, unpack_worker, with_decays, without_decays,
 };
+use super::evaluation_rows::{delete_some_loose_pieces, has_loose_pieces};
 use crate::core::ids::JobId;
 use crate::store::{PartPiece, PartRecord};
 
@@ -31,6 +32,8 @@ pub(super) const TABLE: &str = "
 
 /// Number of pieces that are deleted at once: a record may wait for it.
 const DELETED_AT_ONCE: usize = 128;
+/// Number of pieces of an evaluation that are deleted at once. They are larger.
+const LOOSE_AT_ONCE: usize = 8;
 /// Size of a result in a blob, bytes: its code, its velocity and its estimated error.
 const RESULT_BYTES: usize = 17;
 
@@ -101,8 +104,9 @@ pub(super) fn delete_of_ended(connection: &Connection) -> rusqlite::Result<()> {
     connection.execute_batch("DELETE FROM part WHERE job IN (SELECT job FROM ending)")
 }
 
-/// Parts that nobody needs any more: their evaluation is stored, or their job has ended. There may be
-/// much of them, so they are deleted a few at a time, when no record waits.
+/// Parts that nobody needs any more, because their evaluation is stored, or their job has ended; in the latter
+/// case also pieces of an evaluation that is not stored. There may be much of them, so they are deleted a few
+/// at a time, when no record waits.
 #[derive(Debug, Default)]
 pub(super) struct StaleParts(VecDeque<(JobId, Option<Vec<u8>>)>);
 
@@ -121,10 +125,11 @@ impl StaleParts {
         Ok(())
     }
 
-    /// Notes the parts of a job that is being ended.
+    /// Notes the parts of a job that is being ended, and its pieces that belong to no evaluation.
     pub(super) fn add_of(&mut self, connection: &Connection, job: JobId) -> rusqlite::Result<()> {
         let sql = "SELECT 1 FROM part WHERE job = ?1";
-        if connection.prepare(sql)?.exists(params![job.0])? {
+        let has_parts = connection.prepare(sql)?.exists(params![job.0])?;
+        if has_parts || has_loose_pieces(connection, job)? {
             self.0.push_back((job, None));
         }
         Ok(())
@@ -136,23 +141,30 @@ impl StaleParts {
             return Ok(false);
         };
         // What was noted may not have been stored in the end.
-        let deleted = match point {
+        let left = match point {
             Some(point) => {
                 let sql = "DELETE FROM part WHERE number IN (SELECT number FROM part
                            WHERE job = ?1 AND point = ?2 AND EXISTS (SELECT 1 FROM evaluation
                            WHERE evaluation.job = ?1 AND evaluation.point = ?2) LIMIT ?3)";
-                connection.execute(sql, params![job.0, point, DELETED_AT_ONCE])?
+                connection.execute(sql, params![job.0, point, DELETED_AT_ONCE])? == DELETED_AT_ONCE
             }
             None => {
                 let sql = "DELETE FROM part WHERE number IN (SELECT number FROM part WHERE job = ?1
                            AND EXISTS (SELECT 1 FROM ending WHERE ending.job = ?1) LIMIT ?2)";
-                connection.execute(sql, params![job.0, DELETED_AT_ONCE])?
+                let parts = connection.execute(sql, params![job.0, DELETED_AT_ONCE])?;
+                parts == DELETED_AT_ONCE || Self::delete_loose(connection, *job)?
             }
         };
-        if deleted < DELETED_AT_ONCE {
+        if !left {
             self.0.pop_front();
         }
         Ok(!self.0.is_empty())
+    }
+    /// Deletes some pieces of an ended job that belong to no evaluation. Returns whether there may be more.
+    fn delete_loose(connection: &Connection, job: JobId) -> rusqlite::Result<bool> {
+        let sql = "SELECT 1 FROM ending WHERE job = ?1";
+        let has_ended = connection.prepare(sql)?.exists(params![job.0])?;
+        Ok(has_ended && delete_some_loose_pieces(connection, job, LOOSE_AT_ONCE)? == LOOSE_AT_ONCE)
     }
 }
 

@@ -51,7 +51,9 @@ fn audit_for(
         audited
     } else {
         let fleet = sizing::fleet_rate(state, job);
-        sizing::audit_size(state.workers.get(&worker)?, job, fleet, audited)
+        let all = state.jobs.get(&job)?.certain().flat_map(|evaluation| &evaluation.audits);
+        let waiting = all.map(|audit| audit.indices.count).sum();
+        sizing::audit_size(state.workers.get(&worker)?, job, fleet, (audited, waiting))
     };
     let mut evaluations = state.jobs.get_mut(&job)?.certain_mut();
     let evaluation = evaluations.find(|evaluation| evaluation.attempt == attempt)?;

@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
+use super::ahead;
 use crate::core::ids::JobId;
 use crate::core::job::{FleetRate, Job};
 use crate::core::state::{AttachedWorker, State};
@@ -66,9 +67,8 @@ pub(crate) fn batch_size(
     // A worker may be faster than the fleet was when it was measured.
     let left = (queued + further) as f64;
     let share = left * (weight / fleet.total.max(weight));
-    let workers = state.workers.len();
     let all = realizations(state, job);
-    let worth_s = rate.map_or(WORTH_S, |rate| worth_s(left / rate, all / rate, workers));
+    let worth_s = rate.map_or(WORTH_S, |rate| worth_s(left / rate, all / rate, fleet.workers));
     let worth = rate.map_or(0.0, |rate| (worth_s * rate).min(left));
     let target_s = state.config.batch_target.as_secs_f64();
     // As long as nothing is known, one for each slot takes no longer than fewer.
@@ -85,32 +85,38 @@ pub(crate) fn batch_size(
     if further == 0 { size } else { queued.div_ceil(queued.div_ceil(size).max(1)) }
 }
 
-/// Returns whether there are enough workers for one batch of an evaluation of `job` each. Then one that
-/// `attached` gets while it still holds another would be complete later than on an idle worker, of which
-/// there will be some. With several jobs, or evaluations in several chains, workers hold batches of others
-/// and are not waited for.
+/// Returns whether all workers together compute a whole evaluation of `job` in the time of one batch of `size`.
+/// Then a second one for `attached`, which holds another, would be complete later than on an idle worker, of
+/// which there will be some. With several jobs, or evaluations in several chains, workers hold batches of
+/// others and are not waited for.
 pub(crate) fn is_one_batch_each(
     state: &State,
     attached: &AttachedWorker,
     job: JobId,
     fleet: FleetRate,
-    further: u64,
+    size: u64,
 ) -> bool {
-    let suffice = |rate| suffice(state.workers.len(), realizations(state, job) / rate);
-    further == 0 && state.active.len() == 1 && rate(attached, job, fleet).is_some_and(suffice)
+    let is_alone = |job: &Job| {
+        state.active.len() == 1 && ahead::left(job) == 0 && job.ahead.evaluations().next().is_none()
+    };
+    let suffices = |rate| realizations(state, job) <= size as f64 / rate * fleet.total;
+    state.jobs.get(&job).is_some_and(is_alone) && rate(attached, job, fleet).is_some_and(suffices)
 }
 
-/// Returns the number of realizations of an audit that a worker gets at once, when nothing else waits: an
-/// evaluation waits for its last audits, and many workers compute them together sooner than one.
+/// Returns the number of realizations of an audit of so many that a worker gets at once, when nothing else
+/// waits: an evaluation waits for its last audits, and many workers compute them together sooner than one.
+/// `waiting` is the number of realizations in all audits that wait.
 pub(crate) fn audit_size(
     attached: &AttachedWorker,
     job: JobId,
     fleet: FleetRate,
-    audited: u64,
+    (audited, waiting): (u64, u64),
 ) -> u64 {
-    let of = |rate: f64| (rate * best_s(audited as f64 / rate)).ceil() as u64;
+    let of = |rate: f64| (rate * best_s(waiting as f64 / rate)).ceil() as u64;
     let size = rate(attached, job, fleet).map_or(audited, of);
-    size.max(attached.hello.slots.into()).min(audited)
+    // The worker that is audited has no share.
+    let others = fleet.workers.saturating_sub(1).max(1) as u64;
+    size.max(attached.hello.slots.into()).max(audited.div_ceil(others)).min(audited)
 }
 
 /// Returns the number of realizations of an evaluation of a job.
@@ -204,7 +210,8 @@ pub(crate) fn measured(state: &State, id: JobId) -> FleetRate {
     let per_slot = if slots > 0.0 { all / slots } else { 1.0 };
     let weight =
         |worker: &AttachedWorker| rates(worker).unwrap_or(f64::from(worker.hello.slots) * per_slot);
-    let total = state.workers.values().filter(|it| state.is_sound(it)).map(weight).sum();
+    let sound = || state.workers.values().filter(|it| state.is_sound(it));
+    let (total, workers) = (sound().map(weight).sum(), sound().count());
     let rated_workers = state.jobs.get(&id).map_or(0, |job| job.rated_workers);
-    FleetRate { total, per_slot, rated_workers, changes: state.fleet_changes, uses: 1 }
+    FleetRate { total, workers, per_slot, rated_workers, changes: state.fleet_changes, uses: 1 }
 }

@@ -38,29 +38,31 @@ fn an_audited_batch_is_computed_by_another_worker() {
     rig.check(answer(2, 2, 0, 1), &["store job 1 evaluation 0"]);
 }
 
-/// When nothing else is left to send, an audit is computed in parts, so that many workers share it.
+/// When nothing else is left to send, an audit is computed in parts, if there are several workers to share it.
 #[test]
-fn a_last_audit_is_computed_in_parts() {
-    let mut rig = rig(200, 2);
-    for worker in rig.state.workers.values_mut() {
-        worker.rates.insert(JobId(1), 1e5);
-    }
-    let (mut filled, mut audits) = (Vec::new(), Vec::new());
-    while let Some((&BatchId(id), batch)) = rig.state.batches.first_key_value() {
-        let (Indices { first, count }, worker) = (batch.assignment.indices, batch.worker.0);
-        match batch.purpose {
-            Purpose::Audit { .. } => audits.push((first, count)),
-            _ => filled.push((first, count)),
+fn a_last_audit_is_computed_in_parts_by_several_workers() {
+    for (workers, in_parts) in [(8, true), (2, false)] {
+        let mut rig = rig(200, workers);
+        for worker in rig.state.workers.values_mut() {
+            worker.rates.insert(JobId(1), 1e5);
         }
-        rig.event(answer_in(count as f64 / 1e5, worker, id, first, count));
+        let (mut filled, mut audits) = (Vec::new(), Vec::new());
+        while let Some((&BatchId(id), batch)) = rig.state.batches.first_key_value() {
+            let (Indices { first, count }, worker) = (batch.assignment.indices, batch.worker.0);
+            match batch.purpose {
+                Purpose::Audit { .. } => audits.push((first, count)),
+                _ => filled.push((first, count)),
+            }
+            rig.event(answer_in(count as f64 / 1e5, worker, id, first, count));
+        }
+        assert_eq!(audits.len() > filled.len(), in_parts, "{filled:?} {audits:?}");
+        // Each realization is audited once.
+        audits.sort_unstable();
+        let ends = audits.iter().map(|(first, count)| first + count);
+        let begins = audits.iter().skip(1).map(|(first, _)| *first);
+        assert!(ends.eq(begins.chain([200])), "{audits:?}");
+        assert!(matches!(rig.state.jobs[&JobId(1)].stage, Stage::StoringEvaluation { .. }));
     }
-    assert!(audits.len() > filled.len(), "{filled:?} {audits:?}");
-    // Each realization is audited once.
-    audits.sort_unstable();
-    let ends = audits.iter().map(|(first, count)| first + count);
-    let begins = audits.iter().skip(1).map(|(first, _)| *first);
-    assert!(ends.eq(begins.chain([200])), "{audits:?}");
-    assert!(matches!(rig.state.jobs[&JobId(1)].stage, Stage::StoringEvaluation { .. }));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Order of service and batch sizes.
 
 use super::*;
+use crate::core::reactor::dispatch::overdue::begin_probation;
 use crate::core::reactor::dispatch::sizing::{batch_size, fleet_rate, measured};
 
 /// Checks the batch size for worker 1, with workers of `threads` measured at `rates` realizations
@@ -155,7 +156,9 @@ fn a_job_on_many_workers_begins_with_few_batches_of_unknown_duration() {
     // 8 in 4 ms are 2000 per second.
     for batch in 1..8 {
         let first = 8 * (batch - 1);
-        assert_eq!(sends(answer_in(0.004, batch, batch, first, 8)), [0; 0], "{batch}");
+        // The worker's own speed is known.
+        let sent = sends(answer_in(0.004, batch, batch, first, 8));
+        assert!(sent.len() == 1 && sent[0] > 100, "{batch}: {sent:?}");
     }
     let sent = sends(answer_in(0.004, 8, 8, 56, 8));
     assert!(!sent.is_empty() && sent.iter().all(|count| *count > 100), "{sent:?}");
@@ -180,6 +183,14 @@ fn workers_do_not_wait_for_long_until_the_duration_of_a_batch_is_known() {
     assert_ne!(sends(&mut rig, stored(2, RecordKey::Job)), 0);
     rig.now += Duration::from_millis(5);
     assert_eq!(sends(&mut rig, Event::Tick), 256);
+    // Nothing is sent twice while some have got nothing yet, however late the first answers are.
+    for _ in 0..3 {
+        rig.now += Duration::from_millis(100);
+        rig.event(Event::Tick);
+    }
+    let held = |job| rig.state.batches.values().filter(move |it| it.assignment.job == JobId(job));
+    assert!(held(1).all(|batch| batch.duplicates.is_empty()));
+    assert!(held(1).count() + held(2).count() >= 600);
 }
 
 /// If there are enough workers for one batch of an evaluation each, none gets a second one that an idle worker
@@ -204,6 +215,28 @@ fn a_worker_gets_no_second_batch_if_there_are_enough_workers() {
     assert!(queued > 10_000, "{queued}");
     let sent = rig.event(answer_in(0.004, 9, 9, 64, 8));
     assert!(sent.len() == 1 && sent[0].starts_with("send 9: "), "{sent:?}");
+}
+
+/// Workers on probation get their realization to prove themselves although the others wait for each other.
+#[test]
+fn a_worker_on_probation_is_tried_although_there_are_enough_workers() {
+    let mut rig = Rig::new();
+    for worker in 1..=320 {
+        rig.event(hello_of(worker, u32::try_from(worker).unwrap(), 2));
+    }
+    let name = rig.state.workers[&WorkerId(320)].name.clone();
+    let now = rig.now;
+    begin_probation(&mut rig.state, &name, now, now);
+    // It rests before it is tried.
+    rig.now += Duration::from_secs(4);
+    rig.event(submit(1, "", propagation(20_000)));
+    rig.event(stored(1, RecordKey::Job));
+    for batch in 1..=8 {
+        rig.event(answer_in(0.004, batch, batch, 8 * (batch - 1), 8));
+    }
+    let held = |worker| rig.state.workers[&WorkerId(worker)].in_flight.len();
+    assert!((1..320).all(|worker| held(worker) == 1));
+    assert_eq!(held(320), 1);
 }
 
 #[test]

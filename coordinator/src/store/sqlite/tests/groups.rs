@@ -9,17 +9,13 @@ use crate::metrics::write_times::WriteTimes;
 use crate::store::group::{GROUP_RECORDS_MAX, Group};
 use crate::store::job_output::ReadRequest;
 use crate::store::thread::{StoreCommand, serve};
-use crate::store::{PIECE_OUTCOMES, PieceRecord};
 
-/// Records of every kind, none of which needs another of them; jobs 1 and 2 are stored before.
+/// Records of every kind that lasts by itself, none of which needs another of them; jobs 1 and 2 are stored before.
 fn records() -> Vec<Record> {
     let evaluation = |job, number| {
         let record = evaluation(job, number);
         Record::Evaluation { record, is_last: number > 0 }
     };
-    let outcomes = super::evaluation(1, 4).outcomes;
-    let first = PIECE_OUTCOMES as u64;
-    let piece = PieceRecord { job: JobId(1), number: 4, first, outcomes };
     vec![
         evaluation(1, 0),
         Record::Job(job(3)),
@@ -30,7 +26,6 @@ fn records() -> Vec<Record> {
         Record::Job(job(5)),
         Record::Evaluations(vec![super::evaluation(1, 2), super::evaluation(1, 3)]),
         Record::Part(parts::part(1, 4)),
-        Record::Piece { record: piece, attempt: 7 },
     ]
 }
 

@@ -97,7 +97,7 @@ fn pieces_go_with_their_evaluation() {
 
 #[test]
 fn pieces_that_are_stored_before_are_used_if_they_are_the_same() {
-    let (directory, mut store) = store();
+    let (_directory, mut store) = store();
     let whole = large(0, 3 * PIECE_OUTCOMES + 5);
     let same = piece(0, PIECE_OUTCOMES);
     let other =
@@ -106,9 +106,6 @@ fn pieces_that_are_stored_before_are_used_if_they_are_the_same() {
         store.put_piece(record).unwrap();
         assert!(has(&store, record));
     }
-    // A process that is killed before the evaluation is complete leaves them.
-    drop(store);
-    let mut store = SqliteStore::open(directory.path()).unwrap();
     let jobs = store.jobs().unwrap();
     assert_eq!((jobs[0].evaluations, store.evaluation(JobId(1), 0).unwrap()), (0, None));
     let row = |store: &SqliteStore, first: usize| {
@@ -127,15 +124,55 @@ fn pieces_that_are_stored_before_are_used_if_they_are_the_same() {
     assert!(store.evaluation(JobId(1), 0).unwrap() == Some(whole));
 }
 
+/// A process that is killed before an evaluation is complete leaves pieces, and so does the end of a job.
 #[test]
-fn a_job_that_ends_leaves_no_piece_without_an_evaluation() {
+fn pieces_without_an_evaluation_do_not_stay() {
+    for ends in [true, false] {
+        let (directory, mut store) = store();
+        store.put_evaluation(&large(0, 2 * PIECE_OUTCOMES), true).unwrap();
+        let loose: Vec<PieceRecord> = (1..20).map(|k| piece(1, k * PIECE_OUTCOMES)).collect();
+        for loose in &loose {
+            store.put_piece(loose).unwrap();
+            assert!(has(&store, loose));
+        }
+        if ends {
+            store.settle();
+            assert!(has(&store, &loose[0]), "it is deleted while its job goes on");
+            store.finish_job(&end(1), &summary(1)).unwrap();
+            // A few at a time.
+            assert!(store.settle());
+            assert!(has(&store, &loose[18]));
+            while store.settle() {}
+        } else {
+            drop(store);
+            store = SqliteStore::open(directory.path()).unwrap();
+        }
+        assert_eq!(rows(&store, "SELECT evaluation FROM piece"), [0]);
+        assert!(store.evaluation(JobId(1), 0).unwrap().is_some());
+    }
+}
+
+/// Early pieces have the decays of a job that measures them, as its record has.
+#[test]
+fn pieces_with_decays_agree_with_the_record() {
     let (_directory, mut store) = store();
-    store.put_evaluation(&large(0, 2 * PIECE_OUTCOMES), true).unwrap();
-    let loose = piece(1, PIECE_OUTCOMES);
-    store.put_piece(&loose).unwrap();
-    assert!(has(&store, &loose));
-    store.finish_job(&end(1), &summary(1)).unwrap();
-    assert_eq!(rows(&store, "SELECT evaluation FROM piece"), [0]);
+    let whole = large(0, 3 * PIECE_OUTCOMES);
+    let decays: Vec<f64> =
+        whole.outcomes.iter().map(|outcome| outcome.map_or(0.0, |v| v / 1000.0)).collect();
+    let early = PieceRecord {
+        outcomes: piece(0, PIECE_OUTCOMES)
+            .outcomes
+            .with_decays(Some(decays[PIECE_OUTCOMES..2 * PIECE_OUTCOMES].to_vec())),
+        ..piece(0, PIECE_OUTCOMES)
+    };
+    store.put_piece(&early).unwrap();
+    let row = "SELECT rowid FROM piece WHERE first = 65536";
+    let before = rows(&store, row);
+    let whole =
+        EvaluationRecord { outcomes: whole.outcomes.with_decays(Some(decays)), ..large(0, 1) };
+    store.put_evaluation(&whole, true).unwrap();
+    assert_eq!(rows(&store, row), before, "it was written again");
+    assert!(store.evaluation(JobId(1), 0).unwrap() == Some(whole));
 }
 
 #[test]
