@@ -8,7 +8,7 @@
 //!    one gets no other new work;
 //! 2. duplicates of overdue batches (`overdue.rs`);
 //! 3. audits and tie-breakers (`audits.rs`), then the queues of the evaluations under way;
-//! 4. for idle workers: duplicates of late batches, speculative batches (`idle.rs`), and duplicates
+//! 4. when no batch waits, for idle workers: duplicates of late batches, speculative batches (`idle.rs`), and duplicates
 //!    of the batches that have been out longest (`duplicates.rs`).
 //!
 //! A worker on probation gets one realization at a time.
