@@ -1,7 +1,7 @@
 //! A server of the UM-Bridge protocol, version 1.0: the model of a job as functions over HTTP, for
 //! samplers and other programs in any language.
 //!
-//! `listener` accepts connections, within the bounds of `crowd` and `unread`, `routes` answers requests, `functions` knows what each model
+//! `listener` accepts connections, within the bounds of `crowd`, `routes` answers requests, `functions` knows what each model
 //! computes, and `evaluator` has its realizations computed by the workers of a coordinator.
 
 mod crowd;
@@ -16,7 +16,6 @@ mod protocol_error;
 mod request_config;
 mod request_fields;
 mod routes;
-mod unread;
 
 pub(crate) use self::evaluator::Evaluator;
 pub(crate) use self::functions::ServedJob;

@@ -14,4 +14,4 @@ pub(crate) mod overview;
 pub(crate) mod query;
 pub(crate) mod routes;
 pub(crate) mod source;
-pub(crate) mod stalled;
+pub mod stalled;

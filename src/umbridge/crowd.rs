@@ -1,8 +1,8 @@
-//! Places for connections: a number of them is served, as many wait for a place, and others are refused
-//! at once.
+//! Admission of connections: a fixed number is served at a time, a fixed number waits to be served, and all
+//! others are refused at once.
 //!
-//! Clients of UM-Bridge do not repeat a refused request, and a sampler ends at the first one. So a crowd
-//! that is a little too large has to wait, as evaluations are often short; but nobody waits forever.
+//! Clients of UM-Bridge do not repeat a refused request, and a sampler ends at the first refusal. So some
+//! connections wait, for a limited time, instead of being refused: evaluations are often short.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,20 +15,21 @@ use tokio::time::timeout;
 pub(super) struct CrowdLimits {
     /// Maximum number of connections that are served at a time, and so of requests.
     pub(super) served: usize,
-    /// Maximum number of connections that wait for a place.
+    /// Maximum number of connections that wait to be served.
     pub(super) waiting: usize,
     /// Maximum number of connections that are being refused without a wait.
     pub(super) refused: usize,
-    /// Maximum time of a wait for a place.
+    /// Maximum time for which a connection waits to be served.
     pub(super) wait: Duration,
     /// Time limit for the header of a request, which also ends idle connections. Together with that of a
-    /// body it is not longer than `wait`, so that who sends nothing keeps nobody out.
+    /// body it is not longer than `wait`, so that a client that sends nothing loses its connection before
+    /// those that wait for it are refused.
     pub(super) header: Duration,
     /// Maximum time of a refusal, from the arrival of the request to the end of the connection.
     pub(super) refusal: Duration,
 }
 
-/// Those of the program: not more than 576 connections, where systems usually allow 1024 files.
+/// The bounds of the program: 576 connections in all, since a process may usually have 1024 open files.
 pub(super) const LIMITS: CrowdLimits = CrowdLimits {
     served: 256,
     waiting: 256,
@@ -38,7 +39,7 @@ pub(super) const LIMITS: CrowdLimits = CrowdLimits {
     refusal: Duration::from_secs(10),
 };
 
-/// Who has a place, and who waits for one.
+/// Counts the connections that are served, that wait and that are being refused.
 #[derive(Debug)]
 pub(super) struct Crowd {
     limits: CrowdLimits,
@@ -47,7 +48,8 @@ pub(super) struct Crowd {
     refused: Arc<Semaphore>,
 }
 
-/// What happens to a new connection. Its permit is kept until the connection has ended.
+/// Decision on a connection. Each variant holds a permit that counts the connection; it is dropped when the
+/// connection has ended.
 #[derive(Debug)]
 pub(super) enum Admission {
     /// It is served.
@@ -66,10 +68,11 @@ impl Crowd {
         Self { limits, served, waiting, refused }
     }
 
-    /// Returns what happens to the next connection; `None` if the server is ending. This takes time only
-    /// while as many connections are being refused as may be, of which each soon ends.
+    /// Decides on a new connection; `None` if the server is ending. Waits only while the maximum number of
+    /// connections is being refused; each refusal ends within [`CrowdLimits::refusal`].
     pub(super) async fn admit(&self) -> Option<Admission> {
-        // A place that becomes free belongs to who waits longest, and is not seen here.
+        // The semaphore gives a permit that becomes free to the connection that has waited longest. So a new
+        // connection gets none while others wait.
         let place = |places: &Arc<Semaphore>| Arc::clone(places).try_acquire_owned().ok();
         if let Some(place) = place(&self.served) {
             return Some(Admission::Served(place));
@@ -80,7 +83,8 @@ impl Crowd {
         Arc::clone(&self.refused).acquire_owned().await.ok().map(Admission::Refused)
     }
 
-    /// Waits for a place; returns the permit of a connection that is served, or of one that is refused.
+    /// Waits until a waiting connection may be served or has waited for too long. Returns the decision:
+    /// served or refused.
     pub(super) async fn settle(&self, admission: Admission) -> Admission {
         let Admission::Waits(waiting) = admission else { return admission };
         let place = Arc::clone(&self.served).acquire_owned();
@@ -90,14 +94,14 @@ impl Crowd {
         }
     }
 
-    /// Returns whether connections wait for a place.
+    /// Returns whether connections wait to be served.
     pub(super) fn waits(&self) -> bool {
         self.waiting.available_permits() < self.limits.waiting
     }
 }
 
 impl CrowdLimits {
-    /// Returns what refused clients are told.
+    /// Returns the error message for refused clients.
     pub(super) fn message(&self) -> String {
         let Self { served, waiting, wait, .. } = self;
         format!(
@@ -126,7 +130,7 @@ mod tests {
             Admission::Refused(_) => "refused",
         });
         assert_eq!(kinds, ["served", "waits", "waits", "refused"]);
-        // Whoever comes next is not even refused before the refusal under way has ended.
+        // The next connection is not decided on before the refusal under way has ended.
         assert!(timeout(Duration::from_secs(3600), crowd.admit()).await.is_err());
         drop(refused);
         assert!(matches!(crowd.admit().await, Some(Admission::Refused(_))));

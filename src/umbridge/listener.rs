@@ -13,6 +13,7 @@ use axum::response::Response;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use osteon_coordinator::ReadPeer;
 use thiserror::Error;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinSet;
@@ -20,7 +21,6 @@ use tokio::time::{sleep, timeout};
 
 use super::crowd::{Admission, Crowd, CrowdLimits, LIMITS};
 use super::routes;
-use super::unread::UnreadBounded;
 
 /// Maximum size of the header of a request, bytes.
 const HEADER_BYTES_MAX: usize = 16 * 1024;
@@ -72,7 +72,7 @@ impl ModelListener {
         loop {
             match self.listener.accept().await {
                 Ok((stream, _)) => {
-                    // Whoever came first is admitted first.
+                    // Connections are admitted in the order in which they arrive.
                     let Some(admission) = service.crowd.admit().await else { return };
                     connections.spawn(Arc::clone(&service).connection(stream, admission));
                 }
@@ -84,14 +84,14 @@ impl ModelListener {
     }
 }
 
-/// What all connections share.
+/// The router, and the bounds on connections, which all connections use.
 #[derive(Debug)]
 struct Service {
     limits: CrowdLimits,
     crowd: Arc<Crowd>,
-    /// The endpoints.
+    /// Answers the requests of connections that are served.
     router: Router,
-    /// What answers where there is no place.
+    /// Answers the requests of connections that are refused, with the status 503.
     busy: Router,
 }
 
@@ -99,8 +99,8 @@ impl Service {
     fn new(limits: CrowdLimits, router: Router) -> Self {
         let crowd = Arc::new(Crowd::new(limits));
         let others = Arc::clone(&crowd);
-        // While others wait, a connection ends with its request: one that stays open would keep its place
-        // from request to request.
+        // While other connections wait to be served, a connection is closed after its next answer. Otherwise
+        // a client that keeps its connection open would be served for as long as it likes.
         let leave = move |mut response: Response| {
             if others.waits() {
                 response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
@@ -126,7 +126,7 @@ impl Service {
             .max_buf_size(HEADER_BYTES_MAX)
             .keep_alive(served)
             .serve_connection(
-                TokioIo::new(UnreadBounded::new(stream)),
+                TokioIo::new(ReadPeer::new(stream)),
                 TowerToHyperService::new(router.clone()),
             );
         // Whether a client was slow or has gone makes no difference here.

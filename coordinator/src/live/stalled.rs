@@ -1,4 +1,4 @@
-//! Connections whose peers must read.
+//! Connections that end when their peer stops reading.
 
 use std::io;
 use std::pin::Pin;
@@ -11,17 +11,18 @@ use tokio::time::{Sleep, sleep};
 /// A peer that takes no byte for this long is dropped.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// A connection that fails when its peer stops reading, so that a page which nobody looks at does not
-/// occupy it.
+/// A connection whose writes fail when its peer has stopped reading for 30 s. Otherwise a page that nobody looks
+/// at, or a client that sends request after request and reads no answer, would occupy it forever.
 #[derive(Debug)]
-pub(crate) struct ReadPeer<C> {
+pub struct ReadPeer<C> {
     connection: C,
     /// Time limit of the write under way.
     patience: Option<Pin<Box<Sleep>>>,
 }
 
 impl<C> ReadPeer<C> {
-    pub(crate) fn new(connection: C) -> Self {
+    /// Wraps a connection.
+    pub fn new(connection: C) -> Self {
         Self { connection, patience: None }
     }
 
