@@ -28,8 +28,8 @@ const SMALL_MAX: usize = 1 << 16;
 /// First bits of a number that select its bin: sign, exponent and the first of the fraction.
 const BIN_BITS: u32 = 16;
 
-/// The part of a set with the one or two numbers in its middle. The others need no place: there may be
-/// millions of them.
+/// Some numbers of a set, among them the one or two in its middle, of which the median is computed. The others
+/// are only counted: there may be millions of them.
 struct Sifted {
     /// In any order.
     numbers: Vec<f64>,
@@ -70,7 +70,7 @@ impl Sifted {
 /// Returns an integer that is larger for a larger number.
 fn ascending(number: f64) -> u64 {
     let bits = number.to_bits();
-    // Negative numbers descend with their bits.
+    // The bits of negative numbers, as an integer, are larger for a smaller number.
     if number.is_sign_negative() { !bits } else { bits | SIGN }
 }
 

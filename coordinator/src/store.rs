@@ -274,8 +274,8 @@ pub trait Store {
         Ok(())
     }
 
-    /// Keeps a piece of an evaluation that is not stored yet, so that less of it is left to be written; its
-    /// record need not agree with it. A store may do without.
+    /// Keeps a piece of an evaluation that is not stored yet, so that less is left to be written when it is. If
+    /// the evaluation then has other outcomes, the piece is replaced. A store may do nothing here.
     ///
     /// # Errors
     /// When it is not durable.

@@ -51,7 +51,7 @@ impl Completion {
         let (number, attempt, point) = (evaluation.number, evaluation.attempt, evaluation.point);
         let outcomes = evaluation.outcomes(after.has_decays())?;
         let (estimated_error, assessment) = thread::scope(|scope| {
-            // The record waits for the errors alone.
+            // The record needs the estimated errors but not the moments, so it is sent to the store first.
             let assessed = scope.spawn(|| after.assess(&point, &outcomes));
             let estimated_error = evaluation.estimated_error();
             let is_last = evaluation.diverges_from_store(&outcomes);

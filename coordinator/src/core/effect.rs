@@ -122,7 +122,8 @@ pub enum Record {
     /// Results of an evaluation that is not complete, or that the search has not asked for. They are
     /// only a help: nothing waits for them, and they are not part of any result.
     Part(PartRecord),
-    /// A piece of an evaluation that is not complete. It is only a help, as a part is.
+    /// A piece of an evaluation that is not complete. Nothing waits for it: the record of the evaluation
+    /// contains it too.
     Piece {
         /// The piece.
         record: PieceRecord,

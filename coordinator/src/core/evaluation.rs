@@ -202,7 +202,7 @@ impl PendingEvaluation {
         let place_of = |index: u64| usize::try_from(index).unwrap_or(usize::MAX);
         let (first, most) = (place_of(indices.first), place_of(end.saturating_sub(indices.first)));
         let solved = solved.get(..most).unwrap_or(solved);
-        // There are fewer workers than numbers.
+        // There are never so many workers that their positions do not fit into 32 bits.
         self.results.fill(first, solved, u32::try_from(place).unwrap_or(u32::MAX - 1));
     }
 

@@ -100,9 +100,9 @@ pub(crate) fn take_unsaved(
     (!pieces.is_empty()).then_some(PartRecord { job, point, pieces })
 }
 
-/// Returns pieces of an evaluation that have all their outcomes and were not sent before, as records; none for
-/// one whose number has a record already, which they would damage. The record of the evaluation has them
-/// too, but whoever waits for it then waits only for the rest.
+/// Returns the pieces of an evaluation that have all their outcomes and were not sent to the store before. If
+/// the store has a record with the number of the evaluation, returns none: they would damage that record.
+/// The record of the evaluation contains all pieces; it is written sooner if most are in the store already.
 pub(crate) fn take_pieces(
     evaluation: &mut PendingEvaluation,
     job: JobId,

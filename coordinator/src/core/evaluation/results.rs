@@ -21,7 +21,8 @@ const NO_VELOCITY: f64 = -1.0;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Results {
     outcomes: Arc<Vec<Outcome>>,
-    /// [`NO_VELOCITY`] or at least 0: among millions the velocities are found without the outcomes.
+    /// [`NO_VELOCITY`] for a failure, otherwise at least 0. So the errors of the successes are found without
+    /// reading the outcomes, of which there may be millions.
     estimated_errors: Vec<f64>,
     /// Empty as long as every decay is 0.
     decays: Arc<Vec<f64>>,
@@ -73,8 +74,8 @@ impl Results {
         Some(RealizationResult { outcome, estimated_error, decay })
     }
 
-    /// Gives the indices from `first` on that have no result these ones, given by a worker, whose number
-    /// is below the largest there is.
+    /// Fills the indices from `first` on that have no result with these results of a worker. The number of
+    /// the worker must be below `u32::MAX`.
     pub(crate) fn fill(&mut self, first: usize, solved: &[RealizationResult], owner: u32) {
         let end = first + solved.len();
         let length = self.len().max(end);

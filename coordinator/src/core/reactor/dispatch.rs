@@ -8,8 +8,8 @@
 //!    one gets no other new work;
 //! 2. duplicates of overdue batches (`overdue.rs`);
 //! 3. audits and tie-breakers (`audits.rs`), then the queues of the evaluations under way;
-//! 4. when no batch waits, for idle workers: duplicates of late batches, speculative batches (`idle.rs`), and duplicates
-//!    of the batches that have been out longest (`duplicates.rs`).
+//! 4. when no batch waits, for idle workers: duplicates of late batches, speculative batches (`idle.rs`),
+//!    and duplicates of the batches that have been out longest (`duplicates.rs`).
 //!
 //! A worker on probation gets one realization at a time.
 
@@ -43,7 +43,7 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     sizing::forget_unknown(turn.state, turn.now);
     while schedule::work_waits(turn.state) && hand_one(turn, &kept) {}
     if schedule::next_job(turn.state).is_some() {
-        // What waits is sent soon, and nothing is sent twice meanwhile.
+        // While batches wait, which are sent after one of the next events, no worker gets a duplicate.
         return;
     }
     duplicates::duplicate_late_batches(turn);
@@ -65,7 +65,8 @@ fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
     let is_sound =
         |worker| turn.state.workers.get(&worker).is_some_and(|it| turn.state.is_sound(it));
     let others: Vec<WorkerId> = if !schedule::checks_wait(turn.state) && is_sound(first) {
-        // Other sound workers hold as much, and without checks get nothing either.
+        // The first holds the fewest batches. If no check waits and it gets no batch, no other sound worker
+        // gets one.
         turn.state.order.on_probation().filter(|worker| !kept.contains(worker)).collect()
     } else {
         schedule::free_workers(turn.state, kept).skip(1).collect()
@@ -90,7 +91,7 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
         let attached = turn.state.workers.get(&worker)?;
         let further = turn.state.jobs.get(&job).map_or(0, ahead::left);
         let size = sizing::batch_size(turn.state, attached, job, fleet, (queued, further));
-        // A speculative batch gives way.
+        // A worker that holds only speculative batches counts as idle: other batches go before those.
         let is_busy = turn.state.order.place(worker).is_some_and(|place| place.held > 0);
         if is_busy && sizing::is_one_batch_each(turn.state, attached, job, fleet, size) {
             return None;

@@ -18,8 +18,8 @@ use crate::store::StoreError;
 
 /// The format that this program writes.
 pub(super) const FORMAT: i64 = 8;
-/// The format before it, in which an evaluation has no pieces. A file of it becomes one of the format
-/// that is written.
+/// The format before [`FORMAT`], in which an evaluation has no pieces. A file with this format is read, and
+/// its format is changed to [`FORMAT`].
 pub(super) const FORMER: i64 = 7;
 /// Name of the file in the store's directory.
 pub(super) const FILE: &str = "osteon.sqlite";

@@ -32,7 +32,7 @@ pub(super) const TABLE: &str = "
 
 /// Number of pieces that are deleted at once: a record may wait for it.
 const DELETED_AT_ONCE: usize = 128;
-/// Number of pieces of an evaluation that are deleted at once. They are larger.
+/// Number of pieces of an evaluation that are deleted at once, fewer than parts because they are larger.
 const LOOSE_AT_ONCE: usize = 8;
 /// Size of a result in a blob, bytes: its code, its velocity and its estimated error.
 const RESULT_BYTES: usize = 17;

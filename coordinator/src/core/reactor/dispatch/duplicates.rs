@@ -49,7 +49,7 @@ fn duplicate(
         let Some(idle) = first.filter(|place| !place.on_probation && idle(place)) else {
             return;
         };
-        // Now that a worker is idle, a walk over all batches costs nobody anything.
+        // This walks over all batches, so it is done only when a worker is idle.
         let is_worth = |(_, batch): &(BatchId, &Batch)| old(batch, now) && worth(state, batch);
         let Some((slowest, _)) = open(state).find(is_worth) else {
             return;

@@ -36,7 +36,7 @@ const KNOWN_MIN: u64 = 8;
 /// take. The other workers get theirs after later events. By then some may have answered, and it is known
 /// how large a batch should be.
 const UNKNOWN_AT_ONCE: usize = 256;
-/// Time in which so many are sent and, if they are short, answered.
+/// Time in which so many batches of unknown duration may be sent. Short ones are answered within it.
 const UNKNOWN_TIME: Duration = Duration::from_millis(25);
 /// Number of batches for which the rate of a fleet is used at least.
 const USES_MIN: u64 = 32;
@@ -114,7 +114,7 @@ pub(crate) fn audit_size(
 ) -> u64 {
     let of = |rate: f64| (rate * best_s(waiting as f64 / rate)).ceil() as u64;
     let size = rate(attached, job, fleet).map_or(audited, of);
-    // The worker that is audited has no share.
+    // The worker whose answer is audited computes no part of its audit.
     let others = fleet.workers.saturating_sub(1).max(1) as u64;
     size.max(attached.hello.slots.into()).max(audited.div_ceil(others)).min(audited)
 }

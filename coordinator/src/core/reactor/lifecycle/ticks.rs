@@ -137,7 +137,7 @@ pub(crate) fn store_pieces(turn: &mut Turn) {
         let Some(job) = turn.state.jobs.get_mut(id) else {
             continue;
         };
-        // Others may get another number.
+        // The numbers of evaluations that the search has not asked for may still change.
         if let Stage::Computing(evaluation) = &mut job.stage {
             let attempt = evaluation.attempt;
             let pieces = saved::take_pieces(evaluation, *id, job.search.has_decays()).into_iter();
