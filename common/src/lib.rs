@@ -14,6 +14,7 @@ mod accepted;
 pub mod attainable_moments;
 pub mod attenuation;
 pub mod bulk_velocity;
+pub mod carried_velocity;
 pub mod case;
 pub mod check;
 pub mod conclusions;

@@ -254,6 +254,53 @@ pub struct JobResult {
     pub picking: Picking,
     /// The program that computed it.
     pub program: Program,
+    /// What was found out later about the hosts that computed it; `None` if nothing was.
+    pub integrity: Option<Integrity>,
+}
+
+/// What was found out about the hosts of a job after it had ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Integrity {
+    /// Hosts that computed a part of the job, and were banned for wrong answers after it had ended.
+    pub banned_hosts: Vec<String>,
+    /// Digest of the result before the job was computed again without these hosts; `None` if it was not.
+    pub earlier_digest: Option<String>,
+}
+
+impl Integrity {
+    /// Returns whether the result was computed again without the banned hosts.
+    pub fn is_rechecked(&self) -> bool {
+        self.earlier_digest.is_some()
+    }
+
+    /// Returns whether the result with this digest differs from the one before; `None` if it was not computed
+    /// again.
+    pub fn has_changed(&self, digest: &str) -> Option<bool> {
+        self.earlier_digest.as_ref().map(|earlier| earlier != digest)
+    }
+
+    /// Describes it in a sentence, given the digest of the result.
+    pub fn statement(&self, digest: &str) -> String {
+        let hosts = self.banned_hosts.join(", ");
+        let (host, was) = match self.banned_hosts.len() {
+            1 => ("host", "was"),
+            _ => ("hosts", "were"),
+        };
+        match self.has_changed(digest) {
+            None => format!(
+                "{host} {hosts} computed a part of this result and {was} banned for wrong answers after it \
+                 had ended: do not rely on it before `osteon recheck` has computed it again"
+            ),
+            Some(false) => format!(
+                "computed again without {host} {hosts}, which {was} banned for wrong answers: not a bit has \
+                 changed"
+            ),
+            Some(true) => format!(
+                "computed again without {host} {hosts}, which {was} banned for wrong answers: the result has \
+                 changed, and what was fetched before was wrong"
+            ),
+        }
+    }
 }
 
 /// The best point of a job, with its realizations.

@@ -147,7 +147,7 @@ pub fn need(path: &str) -> Requirement {
             "osteon.v1.Jobs",
             "Get" | "Explain" | "List" | "ListBans" | "ListWorkers" | "Watch" | "Fetch",
         ) => Requirement::Role(Role::Read),
-        ("osteon.v1.Jobs", "Submit" | "Cancel") => Requirement::Role(Role::Submit),
+        ("osteon.v1.Jobs", "Submit" | "Cancel" | "Recheck") => Requirement::Role(Role::Submit),
         ("osteon.v1.Jobs", _) => Requirement::Role(Role::Admin),
         // Reflection, and services that do not exist.
         _ => Requirement::Known,

@@ -29,6 +29,8 @@ pub struct Config {
     pub audit_fraction: f64,
     /// Decides which batches are audited; a running coordinator draws its own key.
     pub audit_key: AuditKey,
+    /// Whether each worker first computes what others computed, before its answers count.
+    pub proofs: bool,
     /// Whether groups and starts that a search has not come to are computed at the same time as those
     /// before them.
     pub ahead: bool,
@@ -72,6 +74,7 @@ impl Default for Config {
             batch_target: Duration::from_millis(200),
             audit_fraction: AUDIT_FRACTION,
             audit_key: AuditKey::default(),
+            proofs: true,
             ahead: true,
             completed_aside_min: 20_000,
             speculation: true,

@@ -3,13 +3,16 @@
 
 pub(crate) mod ahead;
 pub(crate) mod answer_delay;
+pub(crate) mod attachments;
 pub mod audit;
+pub mod ballot;
 pub(crate) mod batch;
 pub mod close_reason;
 pub mod completion;
 pub(crate) mod crashes;
 pub mod dispute;
 pub(crate) mod distribution;
+pub(crate) mod doubts;
 pub mod effect;
 pub mod evaluation;
 pub mod event;
@@ -23,6 +26,7 @@ pub(crate) mod job_pages;
 pub(crate) mod measurements;
 pub mod notice;
 pub(crate) mod probation;
+pub mod proofs;
 pub(crate) mod rate;
 pub mod reactor;
 pub(crate) mod realization_time;

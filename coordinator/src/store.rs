@@ -106,12 +106,12 @@ pub struct PartPiece {
     pub results: Vec<RealizationResult>,
 }
 
-/// A worker that was banned for wrong answers.
+/// A host that was banned for wrong answers of a worker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BanRecord {
     /// Number of the ban, from 1.
     pub number: u64,
-    /// The worker.
+    /// The worker whose answer was found wrong.
     pub worker: WorkerName,
     /// The job in which a wrong answer was found.
     pub job: JobId,
@@ -119,6 +119,19 @@ pub struct BanRecord {
     pub reason: String,
     /// Time of the ban, since the Unix epoch.
     pub at: Duration,
+    /// Time when an operator lifted it, since the Unix epoch.
+    pub lifted: Option<Duration>,
+}
+
+/// An ended job with answers of a host that was banned later.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DoubtRecord {
+    /// The job.
+    pub job: JobId,
+    /// Number of the ban.
+    pub ban: u64,
+    /// Digest of the result that the job had, once it has been begun again.
+    pub digest: Option<String>,
 }
 
 /// The end of a job, with the values that its snapshot shows.
@@ -328,27 +341,29 @@ pub trait Store {
     /// When the store cannot be read.
     fn last_deleted_job(&mut self) -> Result<Option<JobId>, StoreError>;
 
-    /// Makes the ban of a worker durable.
+    /// Makes the ban of a host, or that it is lifted, durable. With a new ban, the ended jobs that the host
+    /// contributed to become doubtful.
     ///
     /// # Errors
     /// When that is not durable.
     fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError>;
 
-    /// Returns all banned workers, in the order of their numbers.
+    /// Returns all bans, in the order of their numbers.
     ///
     /// # Errors
     /// When the store cannot be read.
     fn bans(&mut self) -> Result<Vec<BanRecord>, StoreError>;
 
-    /// Returns the ended jobs with evaluations that a worker contributed to.
+    /// Returns the jobs that were or are doubtful, in the order of their identifiers.
     ///
     /// # Errors
     /// When the store cannot be read.
-    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError>;
+    fn doubts(&mut self) -> Result<Vec<DoubtRecord>, StoreError>;
 
-    /// Deletes all bans.
+    /// Makes an ended job an unfinished one again, in one transaction. Its evaluations stay, and the digest of
+    /// its result is kept with the doubts about it. Returns the job; `None` if there is none.
     ///
     /// # Errors
     /// When that is not durable.
-    fn delete_bans(&mut self) -> Result<(), StoreError>;
+    fn reopen_job(&mut self, job: JobId) -> Result<Option<StoredJob>, StoreError>;
 }

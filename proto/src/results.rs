@@ -8,7 +8,7 @@ use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::posterior::PosteriorDraw;
 use osteon_common::results::{
     BestPoint, DecayEstimate, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupEnding,
-    GroupResult, JobResult, Moments,
+    GroupResult, Integrity, JobResult, Moments,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Picking, SolverSettings};
@@ -75,6 +75,10 @@ pub fn to_message(result: &JobResult) -> v1::JobResult {
         version: result.program.version.clone(),
         numerics: result.program.numerics,
         commit: result.program.commit.clone(),
+        integrity: result.integrity.as_ref().map(|found| v1::Integrity {
+            banned_hosts: found.banned_hosts.clone(),
+            earlier_digest: found.earlier_digest.clone(),
+        }),
     }
 }
 
@@ -111,6 +115,10 @@ pub fn from_message(
         nominal: message.nominal_sampling.map(nominal_from_message),
         picking,
         program: program_from_message(message),
+        integrity: message.integrity.as_ref().map(|found| Integrity {
+            banned_hosts: found.banned_hosts.clone(),
+            earlier_digest: found.earlier_digest.clone(),
+        }),
     })
 }
 

@@ -74,16 +74,19 @@ pub enum Resource {
     Job,
     /// A worker.
     Worker,
+    /// A banned host.
+    Host,
 }
 
 impl Resource {
-    const ALL: [Self; 2] = [Self::Job, Self::Worker];
+    const ALL: [Self; 3] = [Self::Job, Self::Worker, Self::Host];
 
     /// Returns the resource type for a `google.rpc.ResourceInfo`.
     fn name(self) -> &'static str {
         match self {
             Self::Job => "job",
             Self::Worker => "worker",
+            Self::Host => "host",
         }
     }
 }

@@ -11,7 +11,7 @@ use osteon_common::job::{JobKind, JobSpecification, Sampling};
 use osteon_common::moments::KolmogorovTest;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, RealizationResult};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::results::{
+use osteon_common::results::{Integrity, 
     BestPoint, DataSummary, DecayEstimate, Estimate, EstimatedError, Evaluation, EvaluationRole,
     GroupResult, JobFailure, JobResult, Moments, PointMeaning, Status as JobEnd,
 };
@@ -260,6 +260,10 @@ fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
         nominal: NominalSampling::from_setup(&job.setup),
         picking: job.setup.picking,
         program: Program::current(Some("c0ffee")),
+        integrity: Some(Integrity {
+            banned_hosts: vec!["node-7".to_owned()],
+            earlier_digest: Some("00".to_owned()),
+        }),
     };
     let Conclusions { inference, profiles, solutions, posterior } = &result.conclusions;
     assert!(inference.as_ref().is_some_and(|found| found.bulk_velocity.known.is_some()));

@@ -459,6 +459,7 @@ impl Summary {
             nominal: NominalSampling::from_setup(&specification.setup),
             picking: specification.setup.picking,
             program: program.clone(),
+            integrity: None,
         }
     }
 

@@ -46,6 +46,7 @@ pub(crate) fn fetched(status: Status) -> Fetched {
         nominal: None,
         picking: Picking::default(),
         program: Program::current(None),
+        integrity: None,
     };
     Fetched { specification: specification(), result, history: Vec::new() }
 }

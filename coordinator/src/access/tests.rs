@@ -8,7 +8,7 @@ use tonic::{Code, Status};
 use super::*;
 
 /// Every method and its requirement.
-const NEEDS: [(&str, Requirement); 15] = [
+const NEEDS: [(&str, Requirement); 17] = [
     ("/grpc.health.v1.Health/Check", Requirement::Nothing),
     ("/osteon.v1.Jobs/Get", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/List", Requirement::Role(Role::Read)),
@@ -19,7 +19,9 @@ const NEEDS: [(&str, Requirement); 15] = [
     ("/osteon.v1.Jobs/Fetch", Requirement::Role(Role::Read)),
     ("/osteon.v1.Jobs/Submit", Requirement::Role(Role::Submit)),
     ("/osteon.v1.Jobs/Cancel", Requirement::Role(Role::Submit)),
+    ("/osteon.v1.Jobs/Recheck", Requirement::Role(Role::Submit)),
     ("/osteon.v1.Jobs/Prune", Requirement::Role(Role::Admin)),
+    ("/osteon.v1.Jobs/LiftBan", Requirement::Role(Role::Admin)),
     ("/osteon.v1.Jobs/DrainWorker", Requirement::Role(Role::Admin)),
     ("/osteon.v1.Jobs/Backup", Requirement::Role(Role::Admin)),
     ("/osteon.v1.Workers/Attach", Requirement::Worker),

@@ -158,10 +158,10 @@ impl Ahead {
         self.prepared.retain(|_, prepared| prepared.part.is_none_or(|of| of >= part));
     }
 
-    /// Drops all branches, and the complete evaluations with answers of a banned worker.
-    pub(crate) fn forget(&mut self, name: &WorkerName) {
+    /// Drops all branches, and the complete evaluations with answers of a banned host.
+    pub(crate) fn forget(&mut self, host: &str) {
         self.branches.clear();
         self.next_part = 0;
-        self.prepared.retain(|_, prepared| !prepared.workers.contains(name));
+        self.prepared.retain(|_, prepared| !WorkerName::any_of(&prepared.workers, host));
     }
 }

@@ -1,10 +1,11 @@
-//! Audits: decides which batches are computed a second time by another worker.
+//! Audits: decides which realizations are computed a second time on another host.
 
 use std::fmt;
 
 use osteon_proto::identity::{self, NoRandomness};
 
-use crate::core::ids::JobId;
+use crate::core::ids::{BatchId, JobId};
+use crate::core::indices::Indices;
 
 /// Key that decides which batches are audited. It is a secret of a running coordinator, since a
 /// worker that knew it could return wrong answers where they are not checked. It changes no result.
@@ -27,7 +28,7 @@ impl fmt::Debug for AuditKey {
     }
 }
 
-/// Returns whether the batch of `job` that begins at index `first` of evaluation `number` is
+/// Returns whether the saved results of `job` that begin at index `first` of evaluation `number` are
 /// audited: a function of these and the key.
 pub(crate) fn is_chosen(
     key: &AuditKey,
@@ -36,15 +37,53 @@ pub(crate) fn is_chosen(
     first: u64,
     fraction: f64,
 ) -> bool {
+    // 0 chooses nothing, 1 everything.
+    uniform(key, [job.0, number, first]) < fraction
+}
+
+/// Returns which of the realizations `answered` by a worker with `slots` slots are audited, and how many
+/// realizations it computes until the next ones are; `None` if the audits are not due. So that a machine
+/// that breaks is found soon, few realizations are audited often, one for each slot: on another worker they
+/// take no longer than one. When they are due is drawn, so that no worker can foresee it: twice the mean at
+/// the latest. `left` is what was drawn before.
+pub(crate) fn choose(
+    (key, fraction): (&AuditKey, f64),
+    (batch, slots): (BatchId, u32),
+    answered: Indices,
+    left: Option<f64>,
+) -> (Option<Indices>, f64) {
+    let share = (fraction * answered.count as f64).ceil() as u64;
+    let length = share.max(slots.into()).clamp(1, answered.count);
+    let distance =
+        |u: f64| if fraction >= 1.0 { 0.0 } else { 2.0 * u * length as f64 / fraction };
+    let drawn = |what| uniform(key, [batch.0, answered.first, what]);
+    let left = left.unwrap_or_else(|| distance(drawn(0))) - answered.count as f64;
+    if left > 0.0 {
+        return (None, left);
+    }
+    let room = answered.count - length + 1;
+    let offset = ((drawn(1) * room as f64) as u64).min(room - 1);
+    let audited = Indices { first: answered.first + offset, count: length };
+    // What this batch had too much counts for the next ones, so that the fraction is kept.
+    (Some(audited), if fraction >= 1.0 { 0.0 } else { left + distance(drawn(2)) })
+}
+
+/// Returns one index of `answered`, drawn by the key.
+pub(crate) fn choose_one(key: &AuditKey, attempt: u64, answered: Indices) -> Indices {
+    let offset = (uniform(key, [attempt, answered.first, 3]) * answered.count as f64) as u64;
+    let first = answered.first + offset.min(answered.count.saturating_sub(1));
+    Indices { first, count: 1 }
+}
+
+/// Returns a uniform number in [0, 1): a function of these numbers and the key.
+fn uniform(key: &AuditKey, of: [u64; 3]) -> f64 {
     let mut hasher = blake3::Hasher::new_keyed(&key.0);
-    for part in [job.0, number, first] {
+    for part in of {
         hasher.update(&part.to_le_bytes());
     }
     let mut word = [0; 8];
     hasher.finalize_xof().fill(&mut word);
-    // The 53 bits of a uniform number in [0, 1): 0 chooses nothing, 1 everything.
-    let uniform = (u64::from_le_bytes(word) >> 11) as f64 / (1_u64 << 53) as f64;
-    uniform < fraction
+    (u64::from_le_bytes(word) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 #[cfg(test)]
@@ -65,6 +104,43 @@ mod tests {
     fn chosen(key: &AuditKey, fraction: f64) -> Vec<u64> {
         let of = |i: &u64| is_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
         (0..10_000).filter(of).collect()
+    }
+
+    /// Returns the fraction of the realizations that is audited, and the most that a worker computes between
+    /// two audits, over many batches of this size.
+    fn audited(fraction: f64, slots: u32, count: u64) -> (f64, u64) {
+        let (mut left, mut audited, mut since, mut longest) = (None, 0, 0, 0);
+        let batches = 400_000 / count;
+        for batch in 0..batches {
+            let answered = Indices { first: batch * count, count };
+            let key = &AuditKey([7; 32]);
+            let (chosen, next) =
+                choose((key, fraction), (BatchId(batch), slots), answered, left);
+            left = Some(next);
+            since += count;
+            if let Some(chosen) = chosen {
+                assert!(chosen.first >= answered.first && chosen.end() <= answered.end());
+                audited += chosen.count;
+                longest = longest.max(since);
+                since = 0;
+            }
+        }
+        (audited as f64 / (batches * count) as f64, longest)
+    }
+
+    #[test]
+    fn realizations_are_audited_often_and_few_at_a_time() {
+        for (fraction, slots, count) in
+            [(0.01, 1, 1), (0.01, 1, 100), (0.01, 16, 7), (0.01, 16, 3000), (0.3, 2, 40), (0.01, 4, 50)]
+        {
+            let (found, longest) = audited(fraction, slots, count);
+            assert!((0.9..1.15).contains(&(found / fraction)), "{found} of {fraction}");
+            let most = 2.0 * f64::from(slots).max(fraction * count as f64 + 1.0) / fraction;
+            assert!(longest as f64 <= most + count as f64, "{longest}, {most} with {count}");
+        }
+        assert_eq!(audited(0.0, 1, 100).0, 0.0);
+        assert_eq!(audited(1.0, 8, 3).0, 1.0);
+        assert_eq!(audited(1.0, 1, 100).0, 1.0);
     }
 
     #[test]

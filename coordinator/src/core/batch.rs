@@ -25,9 +25,23 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Returns whether an idle worker may receive a duplicate of it before it is overdue.
-    pub(crate) fn may_be_duplicated(&self) -> bool {
-        self.purpose == Purpose::Fill && self.duplicates.is_empty()
+    /// Returns a batch that a worker gets `now`.
+    pub(crate) fn new(
+        assignment: Assignment,
+        purpose: Purpose,
+        worker: WorkerId,
+        now: Duration,
+    ) -> Self {
+        Self {
+            assignment,
+            purpose,
+            worker,
+            sent: now,
+            begun: now,
+            charged: Duration::ZERO,
+            duplicates: Vec::new(),
+            retries: 0,
+        }
     }
 }
 
@@ -48,6 +62,8 @@ pub(crate) enum Purpose {
     },
     /// Its answer decides between answers that differ.
     TieBreak,
+    /// Its answer proves that its worker computes a setup as other hosts do.
+    Proof,
 }
 
 impl Purpose {
@@ -59,6 +75,7 @@ impl Purpose {
             Self::Speculative => "speculative",
             Self::Audit { .. } => "audit",
             Self::TieBreak => "tie_break",
+            Self::Proof => "proof",
         }
     }
 

@@ -22,12 +22,40 @@ pub enum CloseReason {
         /// Fingerprint of the coordinator.
         coordinator: String,
     },
-    /// It was banned for wrong answers.
+    /// Its program has another version than the coordinator, although its numerics are the same.
     #[error(
-        "this worker is banned: it {reason}; check its machine, and start it again when it is \
-         repaired"
+        "this worker is osteon {}, the coordinator is osteon {coordinator}: run the same version on both",
+        worker.escape_debug()
+    )]
+    VersionDiffers {
+        /// Version of the worker.
+        worker: String,
+        /// Version of the coordinator.
+        coordinator: &'static str,
+    },
+    /// Too many workers of its host attach in a short time.
+    #[error("too many workers of host {host} attach in a short time; attach again later")]
+    AttachesTooOften {
+        /// The host.
+        host: String,
+    },
+    /// A velocity in an answer is beyond what the layers can carry.
+    #[error(
+        "this worker answered a velocity of {velocity:e} m/s, which no bone can carry; its answer is refused: \
+         run `osteon doctor` on its machine"
+    )]
+    ImpossibleVelocity {
+        /// The velocity, m/s.
+        velocity: f64,
+    },
+    /// A worker of its host was banned for wrong answers.
+    #[error(
+        "host {host} is banned: one of its workers {reason}; run `osteon doctor` on it, and when it is \
+         repaired, lift the ban with `osteon workers unban {host}`"
     )]
     Banned {
+        /// The host.
+        host: String,
         /// The finding, which completes "it …".
         reason: String,
     },

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::results::Evaluation;
+use osteon_common::results::{Evaluation, Integrity};
 use osteon_proto::batch::Work;
 use osteon_proto::v1::{ExplainResponse, JobSnapshot, ListWorkersResponse, WorkerSnapshot};
 use osteon_search::Summary;
@@ -76,6 +76,13 @@ pub enum Effect {
         reply_id: Option<ReplyId>,
         /// The jobs.
         jobs: Vec<JobId>,
+    },
+    /// Make an ended job an unfinished one again in the store, then report it with an event.
+    Reopen {
+        /// The request.
+        reply_id: ReplyId,
+        /// The job.
+        job: JobId,
     },
     /// Answer a request.
     Answer {
@@ -208,7 +215,12 @@ pub enum Answer {
     /// The search of a job that has not ended.
     Followed(SearchRows),
     /// The job has ended; its output is in the store.
-    Ended(EndRecord),
+    Ended {
+        /// Its end.
+        end: EndRecord,
+        /// What was found out about its hosts since.
+        integrity: Option<Integrity>,
+    },
     /// These ended jobs were deleted.
     Pruned(Vec<JobId>),
     /// The banned workers, with the time since their bans.
@@ -217,6 +229,8 @@ pub enum Answer {
     Workers(ListWorkersResponse),
     /// Snapshot of a worker.
     Worker(WorkerSnapshot),
+    /// The ban that is lifted.
+    Unbanned(BanRecord),
     /// The request is refused.
     Refused(Refusal),
 }
@@ -244,6 +258,28 @@ pub enum Refusal {
     NoWorker {
         /// The worker asked for.
         worker: WorkerId,
+    },
+    /// No ban of this host is in force.
+    #[error("host `{}` is not banned; `osteon workers` lists those that are", host.escape_debug())]
+    NotBanned {
+        /// The host asked for.
+        host: String,
+    },
+    /// The job has no answers of a host that was banned later.
+    #[error(
+        "no host that computed a part of job {job} has been banned since; there is nothing to compute again"
+    )]
+    NoDoubt {
+        /// The job.
+        job: JobId,
+    },
+    /// The store could not begin the job again.
+    #[error("the store cannot begin job {job} again; its result is as before: {error}")]
+    NotReopened {
+        /// The job.
+        job: JobId,
+        /// Error of the store.
+        error: String,
     },
     /// The request id belongs to a job with another specification.
     #[error(

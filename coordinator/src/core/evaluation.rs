@@ -1,6 +1,6 @@
 //! An evaluation under way: a result for each index, and the indices that nobody computes yet.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use osteon_common::outcome::{Outcome, RealizationResult, encode};
@@ -10,8 +10,9 @@ use osteon_common::results::EstimatedError;
 
 use self::results::Results;
 use self::sent_pieces::SentPieces;
+use crate::core::ballot::{self, Vote};
 use crate::core::crashes::{Crashes, LostWorker};
-use crate::core::dispute::{self, Dispute, Vote};
+use crate::core::dispute::Dispute;
 use crate::core::indices::Indices;
 use crate::core::worker_name::WorkerName;
 use crate::store::PartPiece;
@@ -66,6 +67,12 @@ pub struct PendingEvaluation {
     pub(crate) quarantine: VecDeque<u64>,
     /// All workers whose answers are among the results.
     pub(crate) workers: Vec<WorkerName>,
+    /// The last answer of each of these, as far as it is among the results.
+    pub(crate) last_answers: Vec<Indices>,
+    /// Places in `workers` of those whose last answers are audited, or need no audit.
+    pub(crate) vouched: BTreeSet<usize>,
+    /// All results are there, and their workers are proven, or nobody can check them.
+    pub(crate) is_cleared: bool,
     /// Audits that have not been sent yet.
     pub(crate) audits: VecDeque<Audit>,
     /// Number of audits that are being computed.
@@ -98,6 +105,9 @@ impl PendingEvaluation {
             crashes: BTreeMap::new(),
             quarantine: VecDeque::new(),
             workers: Vec::new(),
+            last_answers: Vec::new(),
+            vouched: BTreeSet::new(),
+            is_cleared: false,
             audits: VecDeque::new(),
             audits_out: 0,
             disputes: Vec::new(),
@@ -154,7 +164,21 @@ impl PendingEvaluation {
                 front.first = indices.first;
                 front.count += indices.count;
             }
+            Some(front) if front.end() == indices.first => front.count += indices.count,
             _ => self.queue.push_front(indices),
+        }
+        self.join_front();
+    }
+
+    /// Joins the first indices of the queue with those after them while they are consecutive.
+    fn join_front(&mut self) {
+        while let Some((front, next)) = self.queue.front().copied().zip(self.queue.get(1).copied())
+            && front.end() == next.first
+        {
+            self.queue.pop_front();
+            if let Some(joined) = self.queue.front_mut() {
+                *joined = Indices { first: front.first, count: front.count + next.count };
+            }
         }
     }
 
@@ -192,6 +216,7 @@ impl PendingEvaluation {
         let known = self.workers.iter().position(|worker| worker == by);
         let place = known.unwrap_or_else(|| {
             self.workers.push(by.clone());
+            self.last_answers.push(indices);
             self.workers.len() - 1
         });
         match self.unsaved.last_mut() {
@@ -203,7 +228,18 @@ impl PendingEvaluation {
         let (first, most) = (place_of(indices.first), place_of(end.saturating_sub(indices.first)));
         let solved = solved.get(..most).unwrap_or(solved);
         // There are never so many workers that their positions do not fit into 32 bits.
-        self.results.fill(first, solved, u32::try_from(place).unwrap_or(u32::MAX - 1));
+        let owner = u32::try_from(place).unwrap_or(u32::MAX - 1);
+        self.results.fill(first, solved, owner);
+        let own = self.results.owner(first) == Some(owner);
+        if let Some(last) = self.last_answers.get_mut(place).filter(|_| own) {
+            *last = Indices { first: indices.first, count: self.results.of_same_owner(first, most) as u64 };
+            self.vouched.remove(&place);
+        }
+    }
+
+    /// Notes that the last answer of a worker needs no further audit.
+    pub(crate) fn vouch(&mut self, by: &WorkerName) {
+        self.vouched.extend(self.workers.iter().position(|worker| worker == by));
     }
 
     /// Compares an answer of `by` with the results of `indices`. Returns the difference, from the
@@ -218,7 +254,7 @@ impl PendingEvaluation {
         let first = usize::try_from(indices.first).ok()?;
         let differs = |(place, later): (usize, &RealizationResult)| {
             let earlier = self.results.get(first + place);
-            earlier.is_some_and(|earlier| !dispute::same(earlier, *later))
+            earlier.is_some_and(|earlier| !ballot::same(earlier, *later))
         };
         let at = solved.iter().enumerate().position(differs)?;
         let owner = self.owner(indices.first + at as u64)?;
@@ -256,6 +292,7 @@ impl PendingEvaluation {
     /// Returns whether every index has an outcome and no check of them is pending.
     pub(crate) fn is_settled(&self) -> bool {
         self.filled() >= self.realizations
+            && self.is_cleared
             && self.audits.is_empty()
             && self.audits_out == 0
             && self.disputes.is_empty()

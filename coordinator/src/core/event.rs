@@ -10,6 +10,7 @@ use crate::core::close_reason::CloseReason;
 use crate::core::completion::{Completed, Gathered};
 use crate::core::effect::RecordKey;
 use crate::core::ids::{BatchId, JobId, ReplyId, WorkerId};
+use crate::store::StoredJob;
 use crate::store::EvaluationRecord;
 
 /// An event.
@@ -102,6 +103,22 @@ pub enum Event {
         /// Error text for people, if they could not be deleted.
         outcome: Result<(), String>,
     },
+    /// A ban has made ended jobs doubtful.
+    Doubted {
+        /// Number of the ban.
+        ban: u64,
+        /// The jobs.
+        jobs: Vec<JobId>,
+    },
+    /// An ended job is an unfinished one again in the store, or could not be made one.
+    Reopened {
+        /// The request.
+        reply_id: ReplyId,
+        /// The job.
+        job: JobId,
+        /// What is stored of it; `None` if there is no such job. Or error text for people.
+        outcome: Result<Option<StoredJob>, String>,
+    },
     /// The coordinator shall stop.
     Drain,
 }
@@ -175,6 +192,10 @@ pub enum Request {
     Workers,
     /// Drain a worker: it leaves when it has answered the batches that it holds.
     DrainWorker(WorkerId),
+    /// Lift the ban of a host.
+    Unban(String),
+    /// Compute an ended job again that a banned host contributed to.
+    Recheck(JobId),
 }
 
 /// Which jobs are listed.

@@ -6,19 +6,20 @@ use osteon_common::results::JobFailure;
 use osteon_search::ReplayError;
 use thiserror::Error;
 
-use crate::core::dispute::Contradiction;
+use crate::core::ballot::Contradiction;
 
 /// A failure of a job.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum RunFailure {
-    /// Two answers for one index differ, and no third worker can decide between them.
+    /// Answers for one index differ, and no answer has the majority of the hosts.
     #[error(
-        "integrity error: realization {} at the point {} is {} by {} and {} by {}; one of them \
-         computes wrongly, and there was no third worker to decide: attach three workers and \
-         submit the job again, or run it on each machine alone and compare the digests",
+        "integrity error: realization {} at the point {} is {} by {} and {} by {}; one of them computes \
+         wrongly, and the answers of {} give no majority. Run `osteon doctor` on each of them, and submit the \
+         job again without the wrong one, or with workers on more hosts: at least three, most of them sound",
         contradiction.index, point,
         shown(contradiction.answers[0].1), contradiction.answers[0].0,
-        shown(contradiction.answers[1].1), contradiction.answers[1].0
+        shown(contradiction.answers[1].1), contradiction.answers[1].0,
+        hosts(&contradiction.hosts)
     )]
     Contradiction {
         /// The answers.
@@ -62,6 +63,14 @@ impl RunFailure {
             Self::PoisonRealization { .. } => JobFailure::PoisonRealization,
             Self::Replay(_) | Self::Missing { .. } => JobFailure::Store,
         }
+    }
+}
+
+/// Lists hosts, for people.
+fn hosts(hosts: &[String]) -> String {
+    match hosts {
+        [one] => format!("host {one} contradict each other and"),
+        hosts => format!("hosts {}", hosts.join(", ")),
     }
 }
 

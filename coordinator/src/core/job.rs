@@ -10,8 +10,10 @@ use prost::Message as _;
 
 use crate::config::Config;
 use crate::core::ahead::Ahead;
+use crate::core::doubts::Doubts;
 use crate::core::evaluation::{PendingEvaluation, StoredRecord};
 use crate::core::ids::{BatchId, ReplyId};
+use crate::core::proofs::SetupKey;
 use crate::core::rate::Rate;
 use crate::core::realization_time::RealizationTime;
 use crate::core::saved::SavedParts;
@@ -25,6 +27,8 @@ pub(crate) struct Job {
     pub(crate) record: JobRecord,
     /// Digest of its specification, to compare two submissions with the same request id.
     pub(crate) identity: SpecificationDigest,
+    /// What its workers prove that they compute rightly.
+    pub(crate) setup: SetupKey,
     pub(crate) stage: Stage,
     pub(crate) search: Search,
     /// Evaluations of points that its search will ask for when it comes to other groups and starts.
@@ -65,6 +69,8 @@ pub(crate) struct Job {
     /// Requests that are answered when the current record is durable: submissions at first,
     /// cancellations at the end.
     pub(crate) pending_replies: Vec<ReplyId>,
+    /// What was found out about the hosts of an earlier result of it.
+    pub(crate) doubts: Doubts,
     /// The store's refusal of the current record.
     pub(crate) store_retry: Option<StoreRetry>,
 }
@@ -75,6 +81,7 @@ impl Job {
     pub(crate) fn new(record: JobRecord, stage: Stage, stored: u64, now: Duration) -> Self {
         Self {
             identity: identity(&record.specification),
+            setup: SetupKey::of(&record.specification),
             search: Search::new(record.specification.clone()),
             ahead: Ahead::default(),
             speculation: Speculation::default(),
@@ -97,6 +104,7 @@ impl Job {
             sequence: sequence(0, now),
             progressed: now,
             pending_replies: Vec::new(),
+            doubts: Doubts::default(),
             store_retry: None,
         }
     }
@@ -291,6 +299,8 @@ pub(crate) struct EndedJob {
     /// Sequence number of its last snapshot.
     pub(crate) sequence: u64,
     pub(crate) end: EndRecord,
+    /// What was found out about its hosts since.
+    pub(crate) doubts: Doubts,
 }
 
 impl EndedJob {
@@ -309,6 +319,7 @@ impl EndedJob {
             accepted: record.accepted,
             sequence: self::sequence(sequence, end.ended),
             end,
+            doubts: Doubts::default(),
         }
     }
 }

@@ -84,7 +84,8 @@ pub(crate) fn search_rows(state: &State, id: JobId, from: u64, limit: usize) -> 
 /// Returns the end of an ended job.
 pub(crate) fn end(state: &State, id: JobId) -> Answer {
     if let Some(ended) = state.ended.get(&id) {
-        return Answer::Ended(ended.end.clone());
+        let integrity = ended.doubts.integrity(state);
+        return Answer::Ended { end: ended.end.clone(), integrity };
     }
     match state.jobs.get(&id).map(|job| &job.stage) {
         None | Some(Stage::StoringSubmission) => Answer::Refused(Refusal::NoJob { job: id }),

@@ -15,12 +15,13 @@
 
 use std::time::Duration;
 
+use crate::core::doubts;
 use crate::core::effect::{Effect, RecordKey};
 use crate::core::event::Event;
 use crate::core::state::State;
 
 use self::integrity::{answers, bans, checks};
-use self::lifecycle::{jobs, prune, records, replay, requests, ticks, workers};
+use self::lifecycle::{jobs, prune, recheck, records, replay, requests, ticks, workers};
 use self::turn::Turn;
 
 mod dispatch;
@@ -73,6 +74,10 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::StoreFailed { job, key, error } => records::store_failed(turn, job, key, error),
         Event::Read { job, number, found } => replay::read(turn, job, number, found),
         Event::Pruned { reply_id, jobs, outcome } => prune::pruned(turn, reply_id, jobs, outcome),
+        Event::Doubted { ban, jobs } => {
+            doubts::note(turn.state, ban, jobs, turn.now);
+        }
+        Event::Reopened { reply_id, job, outcome } => recheck::reopened(turn, reply_id, job, outcome),
         Event::Drain => {
             ticks::save_parts(turn, true);
             workers::drain_all(turn);

@@ -174,13 +174,14 @@ fn check_ahead(state: &State, job: &Job) -> Result<(), Inconsistency> {
             point.is_some_and(|point| same_point(&point, &evaluation.point))
         })
     };
-    let banned = state.banned.iter().map(|banned| &banned.record.worker);
+    let banned = state.banned.iter().filter(|banned| banned.record.lifted.is_none());
+    let banned = banned.map(|banned| banned.record.worker.host());
     let mut prepared = job.ahead.all_prepared();
     let fits = parts.clone().is_sorted()
         && parts.all(|of| of >= part && of < job.ahead.next_part)
         && branches.iter().all(at_its_point)
         && (is_under_way(job) || job.ahead.evaluations().next().is_none())
-        && prepared.all(|it| banned.clone().all(|name| !it.workers.contains(name)));
+        && prepared.all(|it| banned.clone().all(|host| !WorkerName::any_of(&it.workers, host)));
     if fits { Ok(()) } else { Err(Inconsistency::Ahead(job.record.job)) }
 }
 
@@ -215,7 +216,7 @@ fn check_checks(
         let tie_breakers =
             dispute.tie_breakers.iter().filter_map(|tie_breaker| state.batches.get(tie_breaker));
         let fits = |batch: &&Batch| {
-            batch.purpose == Purpose::TieBreak && batch.assignment.indices == dispute.indices
+            batch.purpose == Purpose::TieBreak && batch.assignment.indices == dispute.indices()
         };
         tie_breakers.filter(fits).count() == dispute.tie_breakers.len()
     };
@@ -227,13 +228,14 @@ fn check_checks(
     {
         return Err(Inconsistency::Checks(job));
     }
-    for Banned { record, .. } in &state.banned {
-        let name = &record.worker;
-        let attached = state.workers.values().any(|worker| worker.name == *name);
-        let disputes = disputes.iter().any(|dispute| dispute.has_vote_of(name));
-        let told = state.jobs.get(&job).is_some_and(|job| job.workers.contains(name));
-        if attached || disputes || told || evaluation.workers.contains(name) {
-            return Err(Inconsistency::Banned(name.clone()));
+    for Banned { record, .. } in state.banned.iter().filter(|it| it.record.lifted.is_none()) {
+        let host = record.worker.host();
+        let attached = WorkerName::any_of(state.workers.values().map(|worker| &worker.name), host);
+        let disputes = disputes.iter().any(|dispute| dispute.has_vote_of(host));
+        let of_job = |job: &Job| WorkerName::any_of(&job.workers, host);
+        let told = state.jobs.get(&job).is_some_and(of_job);
+        if attached || disputes || told || WorkerName::any_of(&evaluation.workers, host) {
+            return Err(Inconsistency::Banned(record.worker.clone()));
         }
     }
     Ok(())
@@ -249,7 +251,7 @@ fn check_workers(state: &State) -> Result<(), Inconsistency> {
         if held > BATCHES_IN_FLIGHT_MAX || !alone || speculative > 1 || remembered > SETTLED_MAX {
             return Err(Inconsistency::TooMuch(id));
         }
-        for batch in &worker.in_flight {
+        for batch in worker.in_flight.iter().chain(&worker.proofs) {
             if state.batches.get(batch).map(|batch| batch.worker) != Some(id) {
                 return Err(Inconsistency::Holding(id, *batch));
             }
@@ -270,7 +272,8 @@ fn check_batches(state: &State) -> Result<(), Inconsistency> {
     }
     for (&id, batch) in &state.batches {
         let worker = state.workers.get(&batch.worker);
-        let held = worker.map_or(0, |w| w.in_flight.iter().filter(|held| **held == id).count());
+        let all = worker.into_iter().flat_map(|it| it.in_flight.iter().chain(&it.proofs));
+        let held = all.filter(|held| **held == id).count();
         if held != 1 {
             return Err(Inconsistency::Holding(batch.worker, id));
         }
@@ -286,6 +289,13 @@ fn check_batches(state: &State) -> Result<(), Inconsistency> {
             return Err(Inconsistency::Duplicates(id));
         }
         let attempt = batch.assignment.attempt;
+        if batch.purpose == Purpose::Proof {
+            let proofs = state.proofs.with_attempt(attempt);
+            if proofs.is_none_or(|(_, proofs)| proofs.out.get(&batch.worker) != Some(&id)) {
+                return Err(Inconsistency::Stray(id));
+            }
+            continue;
+        }
         let job = state.jobs.get(&batch.assignment.job);
         let asked_for = job.is_some_and(|job| job.certain().any(|it| it.attempt == attempt));
         let speculative = job

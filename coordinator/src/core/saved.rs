@@ -76,9 +76,9 @@ impl SavedParts {
         evaluation.queue_unfilled();
     }
 
-    /// Drops the results of a worker.
-    pub(crate) fn forget(&mut self, name: &WorkerName) {
-        self.0.values_mut().for_each(|pieces| pieces.retain(|piece| piece.by != *name));
+    /// Drops the results of a host.
+    pub(crate) fn forget(&mut self, host: &str) {
+        self.0.values_mut().for_each(|pieces| pieces.retain(|piece| piece.by.host() != host));
     }
 }
 

@@ -84,6 +84,7 @@ fn ended(state: &State, job: &EndedJob) -> JobSnapshot {
         priority: job.priority,
         submit_time: Some(timestamp::to_message(job.accepted)),
         end_time: Some(timestamp::to_message(end.ended)),
+        integrity: job.doubts.statement(state),
         ..JobSnapshot::default()
     };
     snapshot.set_state(JobState::Ended);

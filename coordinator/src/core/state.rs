@@ -8,11 +8,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::limits::WORKERS_MAX;
+use osteon_common::outcome::RealizationResult;
+use osteon_common::parameters::Point;
 use osteon_proto::batch::Work;
-use osteon_proto::evaluation;
+use osteon_proto::evaluation::EvaluationInput;
 
 use crate::config::Config;
 use crate::core::answer_delay::AnswerDelay;
+use crate::core::attachments::Attachments;
 use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::event::Hello;
@@ -21,10 +24,11 @@ use crate::core::ids::{BatchId, JobId, LeaseId, WorkerId};
 use crate::core::job::{EndedJob, Job, RequestName, Stage};
 use crate::core::notice::Departure;
 use crate::core::probation::Probation;
+use crate::core::proofs::{Proofs, SetupKey};
 use crate::core::rate::Rate;
 use crate::core::service_order::ServiceOrder;
 use crate::core::worker_name::WorkerName;
-use crate::store::BanRecord;
+use crate::store::{BanRecord, JobRecord};
 
 /// Maximum number of batches that a worker holds: it computes one while the next is on its way.
 pub const BATCHES_IN_FLIGHT_MAX: usize = 2;
@@ -68,9 +72,16 @@ pub struct State {
     /// Time of the last search for jobs to prune; `None` if there was none.
     pub(crate) pruned: Option<Duration>,
     pub(crate) workers: BTreeMap<WorkerId, AttachedWorker>,
+    /// The hosts of the attached workers, with their number.
+    pub(crate) hosts: BTreeMap<String, usize>,
+    /// How often workers of each host attach.
+    pub(crate) attachments: Attachments,
+    /// What workers computed to prove themselves.
+    pub(crate) proofs: Proofs,
     /// The workers that departed last, newest at the end, at most [`DEPARTED_MAX`].
     pub(crate) departed: VecDeque<Departed>,
-    /// Workers that returned wrong answers, in the order of their detection.
+    /// Workers that returned wrong answers, in the order of their detection, also those whose bans were
+    /// lifted.
     pub(crate) banned: Vec<Banned>,
     /// The workers of each host that were lost in a row while they held batches, without an answer
     /// in between.
@@ -96,8 +107,7 @@ pub struct State {
     pub(crate) draining: bool,
 }
 
-/// A worker that returned wrong answers. It is refused while this process runs, and after a restart
-/// while its ban is in the store.
+/// A worker that returned wrong answers. Its host is refused until an operator lifts the ban.
 #[derive(Debug)]
 pub(crate) struct Banned {
     pub(crate) record: BanRecord,
@@ -149,6 +159,14 @@ pub(crate) struct AttachedWorker {
     pub(crate) heartbeat_sent: Duration,
     /// Batches that it holds, in the order they were sent.
     pub(crate) in_flight: Vec<BatchId>,
+    /// Batches by which it proves itself, which come beside the others.
+    pub(crate) proofs: Vec<BatchId>,
+    /// The setups for which it has proved itself in this stay.
+    pub(crate) proven: BTreeSet<SetupKey>,
+    /// Answers to batches that it holds, which came before its proof.
+    pub(crate) early: Vec<EarlyAnswer>,
+    /// Number of realizations that it computes until the next ones are audited; `None` before the first.
+    pub(crate) until_audit: Option<f64>,
     /// Batches that it answered or that were revoked, newest last.
     pub(crate) settled: VecDeque<(BatchId, Assignment)>,
     /// Its rate over all jobs.
@@ -157,6 +175,14 @@ pub(crate) struct AttachedWorker {
     pub(crate) rates: BTreeMap<JobId, f64>,
     /// It accepts no more batches.
     pub(crate) draining: bool,
+}
+
+/// An answer that waits for the proof of its worker.
+#[derive(Debug)]
+pub(crate) struct EarlyAnswer {
+    pub(crate) batch: BatchId,
+    pub(crate) solved: Vec<RealizationResult>,
+    pub(crate) elapsed_s: f64,
 }
 
 /// Consecutive batches of a worker that others answered, long after it should have.
@@ -186,6 +212,9 @@ impl State {
             started: now,
             pruned: None,
             workers: BTreeMap::new(),
+            hosts: BTreeMap::new(),
+            attachments: Attachments::default(),
+            proofs: Proofs::default(),
             departed: VecDeque::new(),
             banned: Vec::new(),
             lost_in_a_row: BTreeMap::new(),
@@ -237,21 +266,28 @@ impl State {
 
     /// Returns the work of an assignment while its evaluation is under way.
     pub(crate) fn work(&self, assignment: &Assignment) -> Option<Work> {
-        let evaluation = self.evaluation_of(assignment)?;
-        let specification = &self.jobs.get(&assignment.job)?.record.specification;
-        let shared = evaluation::EvaluationInput {
+        let shared = match self.evaluation_of(assignment) {
             // Attempts are numbered over all jobs.
-            id: evaluation.attempt,
+            Some(it) => Arc::new(self.input(assignment.job, it.attempt, it.point)?),
+            None => self.proofs.input(assignment.attempt)?,
+        };
+        Some(Work {
+            evaluation: shared,
+            first: assignment.indices.first,
+            count: u32::try_from(assignment.indices.count).ok()?,
+        })
+    }
+
+    /// Returns what the batches of a point of a job have in common, by this number.
+    pub(crate) fn input(&self, job: JobId, id: u64, point: Point) -> Option<EvaluationInput> {
+        let specification = &self.jobs.get(&job)?.record.specification;
+        Some(EvaluationInput {
+            id,
             setup: specification.setup,
-            point: evaluation.point,
+            point,
             germs: specification.monte_carlo.germs(),
             random: specification.random,
             with_decays: specification.has_decays(),
-        };
-        Some(Work {
-            evaluation: Arc::new(shared),
-            first: assignment.indices.first,
-            count: u32::try_from(assignment.indices.count).ok()?,
         })
     }
 
@@ -284,10 +320,21 @@ impl State {
         self.next_attempt - 1
     }
 
-    /// Returns the ban of a worker, if it is banned.
-    pub(crate) fn ban(&self, name: &WorkerName) -> Option<&BanRecord> {
-        let found = self.banned.iter().find(|banned| banned.record.worker == *name);
-        found.map(|banned| &banned.record)
+    /// Returns the ban of a host that has not been lifted.
+    pub(crate) fn ban(&self, host: &str) -> Option<&BanRecord> {
+        let of_host = |banned: &&Banned| banned.record.worker.host() == host;
+        let records = self.banned.iter().filter(of_host).map(|banned| &banned.record);
+        records.into_iter().find(|record| record.lifted.is_none())
+    }
+
+    /// Returns whether the answers of a worker in a job may be wrong: its host was found to compute wrongly
+    /// after the job had been accepted. That the host has been repaired since changes nothing.
+    pub(crate) fn is_doubtful(&self, name: &WorkerName, job: &JobRecord) -> bool {
+        let concerns = |record: &BanRecord| {
+            record.worker.host() == name.host()
+                && (record.lifted.is_none() || record.at >= job.accepted)
+        };
+        self.banned.iter().any(|banned| concerns(&banned.record))
     }
 
     /// Returns whether any ban is not durable yet.
@@ -330,10 +377,33 @@ impl State {
         !worker.draining && !self.probation.has(&worker.name)
     }
 
+    /// Returns whether a worker may be one that accepts batches and never answers: it has not answered
+    /// anything in this stay, others answered in its place, or it is on probation.
+    pub(crate) fn may_be_silent(&self, worker: &AttachedWorker) -> bool {
+        !worker.has_answered || worker.missed.count > 0 || !self.is_sound(worker)
+    }
+
     /// Returns whether a worker that satisfies `of` accepts batches and is expected to answer them.
     pub(crate) fn answers_batches(&self, of: impl Fn(&WorkerName) -> bool) -> bool {
         let answers = |worker: &AttachedWorker| of(&worker.name) && self.is_sound(worker);
         !self.draining && self.workers.values().any(answers)
+    }
+
+    /// Returns whether an attached worker of another host answers batches, so that it can check answers.
+    pub(crate) fn can_check(&self, host: &str) -> bool {
+        let other = |worker: &AttachedWorker| worker.name.host() != host && self.is_checker(worker);
+        self.several_hosts() && !self.draining && self.workers.values().any(other)
+    }
+
+    /// Returns whether a worker may check the answers of others: it answers batches. With proofs, that is
+    /// known only once it has answered one.
+    pub(crate) fn is_checker(&self, worker: &AttachedWorker) -> bool {
+        self.is_sound(worker) && (worker.has_answered || !self.config.proofs)
+    }
+
+    /// Returns whether the attached workers are of several hosts.
+    pub(crate) fn several_hosts(&self) -> bool {
+        self.hosts.len() > 1
     }
 
     /// Returns the batches that a worker holds for one purpose.
@@ -351,9 +421,16 @@ impl State {
     pub(crate) fn settle(&mut self, batch: BatchId) -> Option<Batch> {
         let settled = self.batches.remove(&batch)?;
         self.overdue.remove(&batch);
+        if settled.purpose == Purpose::Proof {
+            self.proofs.settle(settled.assignment.attempt, settled.worker);
+            if let Some(worker) = self.workers.get_mut(&settled.worker) {
+                worker.proofs.retain(|held| *held != batch);
+            }
+            return Some(settled);
+        }
         if let Some(evaluation) = self.evaluation_of_mut(&settled.assignment) {
             match settled.purpose {
-                Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => {}
+                Purpose::Fill | Purpose::Exclusive | Purpose::Speculative | Purpose::Proof => {}
                 Purpose::Audit { .. } => evaluation.audits_out -= 1,
                 Purpose::TieBreak => {
                     for dispute in &mut evaluation.disputes {
@@ -364,6 +441,7 @@ impl State {
         }
         if let Some(worker) = self.workers.get_mut(&settled.worker) {
             worker.in_flight.retain(|held| *held != batch);
+            worker.early.retain(|early| early.batch != batch);
             worker.settled.push_back((batch, settled.assignment));
             if worker.settled.len() > SETTLED_MAX {
                 worker.settled.pop_front();

@@ -56,7 +56,8 @@ fn stored_together(state: &State, job: JobId) -> u64 {
 }
 
 /// Names of the purposes of batches.
-pub(crate) const PURPOSES: [&str; 5] = ["fill", "exclusive", "speculative", "audit", "tie_break"];
+pub(crate) const PURPOSES: [&str; 6] =
+    ["fill", "exclusive", "speculative", "audit", "tie_break", "proof"];
 
 /// Returns the place of a purpose in [`PURPOSES`].
 fn purpose(purpose: Purpose) -> usize {
@@ -66,6 +67,7 @@ fn purpose(purpose: Purpose) -> usize {
         Purpose::Speculative => 2,
         Purpose::Audit { .. } => 3,
         Purpose::TieBreak => 4,
+        Purpose::Proof => 5,
     }
 }
 

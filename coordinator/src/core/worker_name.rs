@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use osteon_common::visible;
 
-/// A process on a host. A worker that attaches again has the same name; two stays with one name
-/// count as one worker when answers are compared. Two containers may have host and process in
-/// common: the number that each process drew at its start distinguishes them.
+/// A process on a host. A worker that attaches again has the same name. Two containers may have host and
+/// process in common: the number that each process drew at its start distinguishes them. When answers are
+/// compared, all workers of a host count as one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WorkerName {
     host: Arc<str>,
@@ -21,6 +21,11 @@ impl WorkerName {
     pub fn new(host: &str, process: u32, instance: u64) -> Self {
         let shown = |c: char| if visible::is_hidden(c) { '?' } else { c };
         Self { host: host.chars().map(shown).collect::<String>().into(), process, instance }
+    }
+
+    /// Returns whether any of these workers is of this host.
+    pub(crate) fn any_of<'a>(workers: impl IntoIterator<Item = &'a Self>, host: &str) -> bool {
+        workers.into_iter().any(|worker| worker.host() == host)
     }
 
     /// Host name, as the worker sent it.

@@ -101,7 +101,7 @@ impl FollowedSearch {
                 let new = rows.get(overlap..).unwrap_or_default();
                 (self.add(specification, new), rows.len() == ROWS_MAX)
             }
-            Answer::Ended(_) => {
+            Answer::Ended { .. } => {
                 let _permit = source.reading(caller).await?;
                 let job = self.job;
                 let record = fetching::read(&source.store, |to| ReadRequest::Job(job, to)).await?;

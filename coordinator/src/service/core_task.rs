@@ -253,6 +253,13 @@ impl Core {
                         followups.push_back(Event::Pruned { reply_id, jobs, outcome });
                     }
                 }
+                Effect::Reopen { reply_id, job } => {
+                    let command = StoreCommand::Reopen { reply_id, job };
+                    if let Err(refused) = self.commands.try_send(command) {
+                        let outcome = Err(refused.to_string());
+                        followups.push_back(Event::Reopened { reply_id, job, outcome });
+                    }
+                }
                 Effect::Answer { reply_id, answer } => {
                     if let Some(reply) = self.waiting.remove(&reply_id) {
                         // The client may have gone.

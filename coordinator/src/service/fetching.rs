@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use futures::{Stream, StreamExt as _, stream};
 use osteon_common::limits::{FETCH_SECONDS_MAX, READER_STALL_SECONDS_MAX};
+use osteon_common::results::{Integrity, JobResult};
 use osteon_common::outcomes::Outcomes;
 use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::fetch_response::Part;
@@ -79,7 +80,7 @@ async fn left(
 /// they are sent; computations run on a thread of their own.
 pub(crate) async fn send_all(
     store: mpsc::WeakSender<StoreCommand>,
-    end: EndRecord,
+    (end, integrity): (EndRecord, Option<Integrity>),
     reader: FetchStream,
 ) -> Result<(), StreamEnd> {
     let job = end.job;
@@ -87,7 +88,7 @@ pub(crate) async fn send_all(
     reader.send(Part::Specification(specification::to_message(&left.specification))).await?;
     let of_best = reader.kept_waiting(outcomes(&store, job, left.best())).await?;
     let (message, blocks) = computed(&left, &reader, move |left| {
-        let result = left.result(of_best);
+        let result = JobResult { integrity, ..left.result(of_best) };
         (results::to_message(&result), ResultBlocks::new(result.best, result.conclusions))
     })
     .await?;
@@ -351,7 +352,7 @@ mod tests {
                 assert!(answered, "nobody waits any more");
             }
         });
-        let mut stream = Box::pin(paced((), |reader| send_all(weak, end, reader)));
+        let mut stream = Box::pin(paced((), |reader| send_all(weak, (end, None), reader)));
         let (mut parts, mut signs) = (Vec::new(), 0);
         while let Some(part) = timeout(2 * SIGN_OF_LIFE, stream.next()).await.unwrap() {
             let part = part.unwrap().part.unwrap();
@@ -377,7 +378,7 @@ mod tests {
         let (store, _commands) = mpsc::channel(1);
         let semaphore = Arc::new(Semaphore::new(1));
         let permit = permit(&semaphore).await;
-        let stream = paced(permit, |reader| send_all(store.downgrade(), end, reader));
+        let stream = paced(permit, |reader| send_all(store.downgrade(), (end, None), reader));
         let limit = Duration::from_secs(FETCH_SECONDS_MAX) + patience();
         let parts: Vec<_> = timeout(limit, stream.collect()).await.unwrap();
         let last = parts.last().unwrap().as_ref().unwrap_err();

@@ -8,15 +8,16 @@ use futures::Stream;
 use osteon_common::limits::{
     FETCHES_AT_ONCE_MAX, FETCHES_PER_CALLER_MAX, NAME_BYTES_MAX, PRIORITY_MAX,
 };
+use osteon_common::results::Integrity;
 use osteon_proto::spans::{TRACEPARENT, TraceContext};
 use osteon_proto::status::Resource;
 use osteon_proto::v1::jobs_server::Jobs;
 use osteon_proto::v1::{
     BackupRequest, BackupResponse, BannedWorker, CancelRequest, CancelResponse, DrainWorkerRequest,
     DrainWorkerResponse, ExplainRequest, ExplainResponse, FetchRequest, FetchResponse, GetRequest,
-    GetResponse, JobSnapshot, ListBansRequest, ListBansResponse, ListRequest, ListResponse,
-    ListWorkersRequest, ListWorkersResponse, PruneRequest, PruneResponse, SubmitRequest,
-    SubmitResponse, WatchRequest, WatchResponse,
+    GetResponse, JobSnapshot, LiftBanRequest, LiftBanResponse, ListBansRequest, ListBansResponse,
+    ListRequest, ListResponse, ListWorkersRequest, ListWorkersResponse, PruneRequest, PruneResponse,
+    RecheckRequest, RecheckResponse, SubmitRequest, SubmitResponse, WatchRequest, WatchResponse,
 };
 use osteon_proto::{specification, status};
 use tokio::sync::mpsc::error::SendTimeoutError;
@@ -34,7 +35,7 @@ use crate::core::event::{self, Retention};
 use crate::core::ids::{JobId, WorkerId};
 use crate::service::fetching;
 use crate::service::observers;
-use crate::store::EndRecord;
+use crate::store::{BanRecord, EndRecord};
 use crate::store::thread::StoreCommand;
 
 /// Maximum number of jobs in one page.
@@ -110,10 +111,10 @@ impl JobsService {
         Ok(Status::unavailable(format!("job {job} is cancelled, and has not ended yet{waits}")))
     }
 
-    /// Returns the end of an ended job.
-    async fn end(&self, job: JobId) -> Result<EndRecord, Status> {
+    /// Returns the end of an ended job, and what was found out about its hosts since.
+    async fn end(&self, job: JobId) -> Result<(EndRecord, Option<Integrity>), Status> {
         match self.ask(event::Request::Fetch(job)).await? {
-            Answer::Ended(end) => Ok(end),
+            Answer::Ended { end, integrity } => Ok((end, integrity)),
             _ => Err(unexpected()),
         }
     }
@@ -232,9 +233,9 @@ impl Jobs for JobsService {
         let caller = Caller::from_extensions(request.extensions());
         let job = job(&request.into_inner().job)?;
         let permit = self.fetches.acquire(caller).await?;
-        let end = self.end(job).await?;
+        let ended = self.end(job).await?;
         let store = self.store.downgrade();
-        let sent = fetching::paced(permit, |reader| fetching::send_all(store, end, reader));
+        let sent = fetching::paced(permit, |reader| fetching::send_all(store, ended, reader));
         Ok(Response::new(Box::pin(sent)))
     }
 
@@ -294,6 +295,32 @@ impl Jobs for JobsService {
         }
     }
 
+    async fn lift_ban(
+        &self,
+        request: Request<LiftBanRequest>,
+    ) -> Result<Response<LiftBanResponse>, Status> {
+        let host = request.into_inner().host;
+        if host.len() > NAME_BYTES_MAX {
+            return Err(too_long("host", &host));
+        }
+        match self.ask(event::Request::Unban(host)).await? {
+            Answer::Unbanned(record) => {
+                let worker = Some(banned_worker(record, Duration::ZERO));
+                Ok(Response::new(LiftBanResponse { worker }))
+            }
+            _ => Err(unexpected()),
+        }
+    }
+
+    async fn recheck(
+        &self,
+        request: Request<RecheckRequest>,
+    ) -> Result<Response<RecheckResponse>, Status> {
+        let job = job(&request.into_inner().job)?;
+        let snapshot = self.snapshot(event::Request::Recheck(job)).await?;
+        Ok(Response::new(RecheckResponse { snapshot }))
+    }
+
     async fn list_bans(
         &self,
         _: Request<ListBansRequest>,
@@ -301,14 +328,18 @@ impl Jobs for JobsService {
         let Answer::Banned(banned) = self.ask(event::Request::Banned).await? else {
             return Err(unexpected());
         };
-        let workers = banned.into_iter().map(|(record, elapsed)| BannedWorker {
-            host: record.worker.host().to_owned(),
-            process: record.worker.process(),
-            job: record.job.to_string(),
-            reason: record.reason,
-            elapsed_s: elapsed.as_secs_f64(),
-        });
+        let workers = banned.into_iter().map(|(record, elapsed)| banned_worker(record, elapsed));
         Ok(Response::new(ListBansResponse { workers: workers.collect() }))
+    }
+}
+
+fn banned_worker(record: BanRecord, elapsed: Duration) -> BannedWorker {
+    BannedWorker {
+        host: record.worker.host().to_owned(),
+        process: record.worker.process(),
+        job: record.job.to_string(),
+        reason: record.reason,
+        elapsed_s: elapsed.as_secs_f64(),
     }
 }
 
@@ -339,14 +370,18 @@ fn refused(refusal: &Refusal) -> Status {
         Refusal::NoWorker { worker } => {
             status::not_found(Resource::Worker, worker.to_string(), message)
         }
+        Refusal::NotBanned { host } => {
+            status::not_found(Resource::Host, host.clone(), message)
+        }
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
         Refusal::TooManyJobs { .. } | Refusal::TooMuchQueued { .. } => {
             status::resource_exhausted(message, RETRY)
         }
-        Refusal::NotEnded { .. } => Status::failed_precondition(message),
-        Refusal::Draining | Refusal::Store { .. } | Refusal::NotPruned { .. } => {
-            Status::unavailable(message)
-        }
+        Refusal::NotEnded { .. } | Refusal::NoDoubt { .. } => Status::failed_precondition(message),
+        Refusal::Draining
+        | Refusal::Store { .. }
+        | Refusal::NotPruned { .. }
+        | Refusal::NotReopened { .. } => Status::unavailable(message),
     }
 }
 

@@ -138,14 +138,17 @@ pub(crate) fn heartbeat() -> AttachResponse {
 /// Returns the status that ends a worker's stream.
 pub(crate) fn status(reason: &CloseReason) -> Status {
     let code = match reason {
-        CloseReason::FingerprintDiffers { .. } => Code::FailedPrecondition,
+        CloseReason::FingerprintDiffers { .. } | CloseReason::VersionDiffers { .. } => {
+            Code::FailedPrecondition
+        }
         CloseReason::Slots { .. }
         | CloseReason::NameTooLong { .. }
         | CloseReason::Malformed(_)
         | CloseReason::WrongCount { .. }
+        | CloseReason::ImpossibleVelocity { .. }
         | CloseReason::SecondHello => Code::InvalidArgument,
         CloseReason::Banned { .. } => Code::PermissionDenied,
-        CloseReason::TooManyWorkers { .. } => {
+        CloseReason::TooManyWorkers { .. } | CloseReason::AttachesTooOften { .. } => {
             return resource_exhausted(reason.to_string(), RETRY);
         }
         CloseReason::Expired { .. } | CloseReason::Unanswering { .. } | CloseReason::NotReading => {

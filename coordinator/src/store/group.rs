@@ -6,7 +6,7 @@ use osteon_common::job::{Data, VelocitySet};
 use crate::core::effect::Record;
 use crate::core::event::Event;
 use crate::core::ids::JobId;
-use crate::store::{BanRecord, Store, StoreError};
+use crate::store::{DoubtRecord, Store, StoreError};
 
 /// Maximum number of records in a group.
 pub(crate) const GROUP_RECORDS_MAX: usize = 256;
@@ -59,17 +59,45 @@ impl Group {
 /// written is alone, and fails alone.
 fn write(store: &mut dyn Store, records: &[Record], report: &mut dyn FnMut(Event)) {
     if let [record] = records {
-        report(outcome(record, put(store, record)));
+        let stored = put(store, record);
+        if stored.is_ok() {
+            report_doubts(store, record, report);
+        }
+        report(outcome(record, stored));
         return;
     }
     match store.together(&mut |store| records.iter().try_for_each(|record| put(store, record))) {
-        Ok(()) => records.iter().for_each(|record| report(outcome(record, Ok(())))),
+        Ok(()) => {
+            for record in records {
+                report_doubts(store, record, report);
+                report(outcome(record, Ok(())));
+            }
+        }
         Err(error) => {
             tracing::debug!(records = records.len(), %error, "records are written in two halves");
             let (first, second) = records.split_at(records.len() / 2);
             write(store, first, report);
             write(store, second, report);
         }
+    }
+}
+
+/// Reports the ended jobs that have become doubtful by a ban, if there are any.
+fn report_doubts(store: &mut dyn Store, record: &Record, report: &mut dyn FnMut(Event)) {
+    let Record::Ban(ban) = record else {
+        return;
+    };
+    match store.doubts() {
+        Ok(doubts) => {
+            let of_ban = |doubt: &DoubtRecord| doubt.ban == ban.number;
+            let jobs: Vec<JobId> = doubts.into_iter().filter(of_ban).map(|doubt| doubt.job).collect();
+            if !jobs.is_empty() {
+                report(Event::Doubted { ban: ban.number, jobs });
+            }
+        }
+        Err(error) => tracing::error!(ban = ban.number, %error,
+            "the ended jobs that the banned host contributed to cannot be read; they are named after a \
+             restart"),
     }
 }
 
@@ -92,7 +120,7 @@ fn put(store: &mut dyn Store, record: &Record) -> Result<(), StoreError> {
         Record::Part(record) => store.put_part(record),
         Record::Piece { record, .. } => store.put_piece(record),
         Record::End { end, summary } => store.finish_job(end, summary),
-        Record::Ban(record) => ban(store, record),
+        Record::Ban(record) => store.put_ban(record),
     }
 }
 
@@ -119,17 +147,4 @@ fn bytes(record: &Record) -> usize {
             }
             Record::Ban(_) => 0,
         }
-}
-
-/// Stores a ban, and logs the ended jobs whose results can no longer be relied on.
-fn ban(store: &mut dyn Store, record: &BanRecord) -> Result<(), StoreError> {
-    store.put_ban(record)?;
-    // Logging is a courtesy: if its query fails, the stored ban remains.
-    let ended = store.ended_jobs_of(&record.worker).unwrap_or_default();
-    if !ended.is_empty() {
-        let jobs: Vec<String> = ended.iter().map(JobId::to_string).collect();
-        tracing::error!(worker = %record.worker, jobs = jobs.join(" "),
-            "these jobs ended before the worker was found to compute wrongly; run them again");
-    }
-    Ok(())
 }

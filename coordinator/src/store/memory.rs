@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use osteon_search::{Summary, same_point};
 
 use super::{
-    BanRecord, Changes, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store, StoreError,
-    StoredJob,
+    BanRecord, Changes, DoubtRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord, Store,
+    StoreError, StoredJob,
 };
 use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
@@ -24,6 +24,7 @@ struct StoreContent {
     parts: Vec<PartRecord>,
     summaries: BTreeMap<JobId, Summary>,
     bans: BTreeMap<u64, BanRecord>,
+    doubts: BTreeMap<(JobId, u64), DoubtRecord>,
 }
 
 impl MemoryStore {
@@ -125,6 +126,7 @@ impl Store for MemoryStore {
         content.summaries.retain(|job, _| !jobs.contains(job));
         content.evaluations.retain(|(job, _), _| !jobs.contains(job));
         content.parts.retain(|part| !jobs.contains(&part.job));
+        content.doubts.retain(|(job, _), _| !jobs.contains(job));
         Ok(())
     }
 
@@ -133,7 +135,18 @@ impl Store for MemoryStore {
     }
 
     fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
-        self.content().bans.insert(record.number, record.clone());
+        let mut content = self.content();
+        if content.bans.insert(record.number, record.clone()).is_none() {
+            let host = record.worker.host();
+            let of_host = content.evaluations.values().filter(|it| WorkerName::any_of(&it.workers, host));
+            let jobs: BTreeSet<JobId> = of_host.map(|evaluation| evaluation.job).collect();
+            for job in jobs {
+                if content.jobs.get(&job).is_some_and(|job| job.end.is_some()) {
+                    let doubt = DoubtRecord { job, ban: record.number, digest: None };
+                    content.doubts.insert((job, record.number), doubt);
+                }
+            }
+        }
         Ok(())
     }
 
@@ -141,16 +154,22 @@ impl Store for MemoryStore {
         Ok(self.content().bans.values().cloned().collect())
     }
 
-    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
-        let content = self.content();
-        let of_worker = content.evaluations.values().filter(|it| it.workers.contains(worker));
-        let jobs: BTreeSet<JobId> = of_worker.map(|evaluation| evaluation.job).collect();
-        let ended = |job: &JobId| content.jobs.get(job).is_some_and(|job| job.end.is_some());
-        Ok(jobs.into_iter().filter(ended).collect())
+    fn doubts(&mut self) -> Result<Vec<DoubtRecord>, StoreError> {
+        Ok(self.content().doubts.values().cloned().collect())
     }
 
-    fn delete_bans(&mut self) -> Result<(), StoreError> {
-        self.content().bans.clear();
-        Ok(())
+    fn reopen_job(&mut self, job: JobId) -> Result<Option<StoredJob>, StoreError> {
+        let mut content = self.content();
+        let digest = content.summaries.remove(&job).map(|summary| summary.digest);
+        let open = content.doubts.values_mut().filter(|doubt| doubt.job == job);
+        open.filter(|doubt| doubt.digest.is_none()).for_each(|doubt| {
+            doubt.digest = Some(digest.clone().unwrap_or_default());
+        });
+        let evaluations = content.evaluations.range((job, 0)..=(job, u64::MAX)).count() as u64;
+        let reopened = content.jobs.get_mut(&job).map(|stored| {
+            stored.end = None;
+            StoredJob { evaluations, ..stored.clone() }
+        });
+        Ok(reopened)
     }
 }

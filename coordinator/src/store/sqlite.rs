@@ -18,14 +18,14 @@ use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::{
-    BanRecord, BetweenPieces, Changes, DamagedRecord, EndRecord, EvaluationRecord, JobRecord,
-    PartRecord, PieceRecord, Store, StoreError, StoredJob,
+    BanRecord, BetweenPieces, Changes, DamagedRecord, DoubtRecord, EndRecord, EvaluationRecord,
+    JobRecord, PartRecord, PieceRecord, Store, StoreError, StoredJob,
 };
 use crate::core::ids::JobId;
-use crate::core::worker_name::WorkerName;
 
 mod acknowledged;
 mod backup;
+mod ban_rows;
 mod columns;
 mod evaluation_rows;
 mod group;
@@ -39,7 +39,7 @@ mod summary;
 
 pub use acknowledged::LostJobs;
 use acknowledged::{LAST_DELETED_JOB, Mark, last_known, never_again};
-use columns::{JobColumns, ban_checksum, end_checksum, job_checksum, nanoseconds, pack_workers};
+use columns::{JobColumns, end_checksum, job_checksum, nanoseconds};
 use job_row::{damaged_end, job_columns, job_record};
 use log::Log;
 use parts::StaleParts;
@@ -122,6 +122,12 @@ impl SqliteStore {
 
     fn damaged(&self, job: JobId, record: DamagedRecord) -> StoreError {
         StoreError::Damaged { path: self.path.clone(), job, record }
+    }
+
+    /// Returns records of bans, unless one is damaged.
+    fn intact<T>(&self, rows: Vec<Result<T, JobId>>) -> Result<Vec<T>, StoreError> {
+        let checked = rows.into_iter().collect::<Result<_, _>>();
+        checked.map_err(|job| self.damaged(job, DamagedRecord::Ban))
     }
 
     /// Calls `visit` with the jobs that satisfy a condition.
@@ -219,7 +225,7 @@ impl SqliteStore {
     /// Deletes jobs and all their records; their identifiers are never assigned again.
     fn remove_jobs(&self, jobs: &[JobId]) -> rusqlite::Result<()> {
         let transaction = self.connection.unchecked_transaction()?;
-        for table in ["summary", "ending", "evaluation", "piece", "part"] {
+        for table in ["summary", "ending", "evaluation", "piece", "part", "doubt"] {
             let sql = format!("DELETE FROM {table} WHERE job = ?1");
             let mut delete = transaction.prepare(&sql)?;
             for job in jobs {
@@ -412,58 +418,26 @@ impl Store for &SqliteStore {
     }
 
     fn put_ban(&mut self, record: &BanRecord) -> Result<(), StoreError> {
-        let BanRecord { number, worker, job, reason, at } = record;
-        let sql = "INSERT OR REPLACE INTO ban (number, host, process, instance, job, reason, at_ns,
-                   checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)";
-        let (host, process, at) = (worker.host(), worker.process(), nanoseconds(*at));
-        let instance = worker.instance().cast_signed();
-        let checksum = ban_checksum(record);
-        let values = params![number, host, process, instance, job.0, reason, at, checksum];
-        self.connection.execute(sql, values).map_err(|source| self.refused(source))?;
-        Ok(())
+        self.change(|connection| ban_rows::put(connection, record))
     }
 
     fn bans(&mut self) -> Result<Vec<BanRecord>, StoreError> {
-        let sql = "SELECT number, host, process, job, reason, at_ns, checksum, instance FROM ban
-                   ORDER BY number";
-        let read = |row: &Row<'_>| {
-            let (host, checksum): (String, Vec<u8>) = (row.get(1)?, row.get(6)?);
-            let instance: i64 = row.get(7)?;
-            let record = BanRecord {
-                number: row.get(0)?,
-                worker: WorkerName::new(&host, row.get(2)?, instance.cast_unsigned()),
-                job: JobId(row.get(3)?),
-                reason: row.get(4)?,
-                at: Duration::from_nanos(row.get(5)?),
-            };
-            Ok((checksum == ban_checksum(&record), record))
-        };
-        let run = || -> rusqlite::Result<Vec<(bool, BanRecord)>> {
-            self.connection.prepare(sql)?.query_map([], read)?.collect()
-        };
-        let rows = run().map_err(|source| self.refused(source))?;
-        let checked = rows
-            .into_iter()
-            .map(|(intact, record)| intact.then_some(record.clone()).ok_or(record.job));
-        checked.collect::<Result<_, _>>().map_err(|job| self.damaged(job, DamagedRecord::Ban))
+        let rows = ban_rows::all(&self.connection).map_err(|source| self.refused(source))?;
+        self.intact(rows)
     }
 
-    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
-        let sql = "SELECT DISTINCT evaluation.job FROM evaluation
-                   JOIN ending ON ending.job = evaluation.job
-                   WHERE instr(char(10) || workers || char(10), char(10) || ?1 || char(10)) > 0
-                   ORDER BY evaluation.job";
-        let line = pack_workers(&[worker.clone()].into());
-        let run = || -> rusqlite::Result<Vec<JobId>> {
-            let mut statement = self.connection.prepare(sql)?;
-            statement.query_map([line], |row| row.get(0).map(JobId))?.collect()
-        };
-        run().map_err(|source| self.refused(source))
+    fn doubts(&mut self) -> Result<Vec<DoubtRecord>, StoreError> {
+        let rows = ban_rows::doubts(&self.connection).map_err(|source| self.refused(source))?;
+        self.intact(rows)
     }
 
-    fn delete_bans(&mut self) -> Result<(), StoreError> {
-        let deleted = self.connection.execute("DELETE FROM ban", []);
-        deleted.map(drop).map_err(|source| self.refused(source))
+    fn reopen_job(&mut self, job: JobId) -> Result<Option<StoredJob>, StoreError> {
+        let Some(record) = self.job(job)? else {
+            return Ok(None);
+        };
+        let evaluations = self.evaluations(job)?;
+        self.change(|connection| ban_rows::reopen(connection, job))?;
+        Ok(Some(StoredJob { record, end: None, evaluations }))
     }
 
     fn settle(&mut self) -> bool {

@@ -36,6 +36,8 @@ pub(crate) enum StoreCommand {
     Read { job: JobId, number: u64 },
     /// Delete ended jobs.
     Prune { reply_id: Option<ReplyId>, jobs: Vec<JobId> },
+    /// Make an ended job an unfinished one again.
+    Reopen { reply_id: ReplyId, job: JobId },
     /// Read a record of an ended job's output.
     Fetch(ReadRequest),
     /// Copy the whole store.
@@ -178,6 +180,10 @@ impl PendingWork<'_> {
             StoreCommand::Prune { reply_id, jobs } => {
                 let outcome = store.delete_jobs(&jobs).map_err(|error| error.to_string());
                 drop(self.events.blocking_send(Event::Pruned { reply_id, jobs, outcome }));
+            }
+            StoreCommand::Reopen { reply_id, job } => {
+                let outcome = store.reopen_job(job).map_err(|error| error.to_string());
+                drop(self.events.blocking_send(Event::Reopened { reply_id, job, outcome }));
             }
             StoreCommand::Fetch(reading) => self.readings.push_back(reading),
             StoreCommand::Copy { reply } => self.copies.push_back(reply),

@@ -12,7 +12,7 @@ use osteon_common::inference::{
 use osteon_common::job::{Prior, Sampling, SearchMethod};
 use osteon_common::moments::{ConfidenceInterval, MomentIntervals, Outlier};
 use osteon_common::parameters::{AS_IN_SETUP, BONE_PARAMETERS, Parameter, Point};
-use osteon_common::results::{DataSummary, DecayEstimate, JobFailure, PointMeaning, Status};
+use osteon_common::results::{Integrity, DataSummary, DecayEstimate, JobFailure, PointMeaning, Status};
 
 /// Any number, including both zeros, infinities and subnormal numbers.
 pub(crate) fn number() -> impl Strategy<Value = f64> {
@@ -293,6 +293,10 @@ prop_compose! {
             nominal: control_variate.then_some(NominalSampling { band: 2e6, period: 1e-4, pairs: 7 }),
             picking: Picking::default(),
             program: Program { version: "0.1.0".to_owned(), numerics, commit },
+            integrity: (numerics % 2 == 0).then(|| Integrity {
+                banned_hosts: vec!["node-7".to_owned()],
+                earlier_digest: (numerics % 4 == 0).then(|| "00".to_owned()),
+            }),
         }
     }
 }
@@ -420,6 +424,7 @@ fn complete() -> v1::JobResult {
         nominal: None,
         picking: Picking::default(),
         program: Program::current(None),
+        integrity: None,
     })
 }
 

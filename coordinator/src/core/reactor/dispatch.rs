@@ -21,7 +21,7 @@ use crate::core::job::Job;
 use crate::core::reactor::turn::Turn;
 
 pub(super) mod ahead;
-mod audits;
+pub(super) mod audits;
 pub(super) mod batches;
 pub(super) mod departures;
 mod duplicates;
@@ -29,6 +29,7 @@ mod eta;
 mod idle;
 pub(super) mod overdue;
 pub(super) mod poison;
+pub(super) mod proofs;
 mod schedule;
 pub(super) mod sizing;
 pub(super) mod speculation;

@@ -2,6 +2,7 @@
 
 pub(super) mod jobs;
 pub(super) mod prune;
+pub(super) mod recheck;
 pub(super) mod records;
 pub(super) mod replay;
 pub(super) mod requests;

@@ -47,8 +47,9 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
-        // Speculative batches would disturb most tests.
-        let config = Config { active_jobs_max: 2, speculation: false, ..Config::default() };
+        // Speculative batches and proofs would disturb most tests.
+        let config =
+            Config { active_jobs_max: 2, speculation: false, proofs: false, ..Config::default() };
         Self { state: State::new(config, Duration::ZERO), now: Duration::ZERO }
     }
 
@@ -175,12 +176,12 @@ fn stored(job: u64, key: RecordKey) -> Event {
 }
 
 fn hello(worker: u64, threads: u32) -> Event {
-    hello_of(worker, 42, threads)
+    hello_on("node", worker, 42, threads)
 }
 
-/// Returns the hello event of a worker that runs in `process`.
+/// Returns the hello event of a worker that runs in `process`, on a host of its own.
 fn hello_of(worker: u64, process: u32, threads: u32) -> Event {
-    hello_on("node", worker, process, threads)
+    hello_on(&format!("node-{process}"), worker, process, threads)
 }
 
 /// Returns the hello event of a worker that runs in `process` on `host`.
@@ -259,6 +260,7 @@ fn described(effect: &Effect) -> String {
         Effect::ReportStoreFailure { error, waited } => {
             format!("give_up after {waited:?}: {error}")
         }
+        Effect::Reopen { job, .. } => format!("reopen {job}"),
         Effect::Stop => "stop".to_owned(),
     }
 }
@@ -275,12 +277,13 @@ fn answered(answer: &Answer) -> String {
         }
         Answer::Explained(explained) => format!("{:?}", explained.reason()),
         Answer::Followed(search) => format!("rows {}", search.rows.len()),
-        Answer::Ended(end) => format!("ended {}", end.job),
+        Answer::Ended { end, .. } => format!("ended {}", end.job),
         Answer::Pruned(jobs) => format!("pruned {}", jobs.len()),
         Answer::Banned(banned) => format!("banned {}", banned.len()),
         Answer::Workers(list) => {
             format!("{} workers, {} departed", list.workers.len(), list.departed.len())
         }
+        Answer::Unbanned(record) => format!("lifted {}", record.worker.host()),
         Answer::Worker(worker) => format!("worker {} {:?}", worker.worker, worker.state()),
         Answer::Refused(refusal) => refusal.to_string(),
     }

@@ -46,7 +46,8 @@ pub(super) fn job_checksum(columns: &JobColumns<'_>) -> Vec<u8> {
 }
 
 pub(super) fn ban_checksum(record: &BanRecord) -> Vec<u8> {
-    let BanRecord { number, worker, job, reason, at } = record;
+    // That it was lifted is in a row of its own.
+    let BanRecord { number, worker, job, reason, at, lifted: _ } = record;
     let numbers = [*number, job.0, nanoseconds(*at), worker.process().into(), worker.instance()];
     let numbers = numbers.map(u64::to_le_bytes);
     let mut fields: Vec<&[u8]> = numbers.iter().map(<[u8; 8]>::as_slice).collect();

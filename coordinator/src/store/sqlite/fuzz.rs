@@ -5,7 +5,7 @@
 use osteon_fuzz::{CASES, bounded, bytes, check, damaged, here};
 use osteon_proto::{results, v1};
 
-use super::columns::{evaluation_checksum, pack_errors, pack_outcomes, pack_point};
+use super::columns::{evaluation_checksum, pack_errors, pack_outcomes, pack_point, pack_workers};
 use super::summary::summary_checksum;
 use super::tests::{end, evaluation, job, summary};
 use super::*;

@@ -13,14 +13,14 @@ use rusqlite::config::DbConfig;
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
 use super::schema::SCHEMA;
-use super::{evaluation_rows, parts};
+use super::{ban_rows, evaluation_rows, parts};
 use crate::store::StoreError;
 
 /// The format that this program writes.
-pub(super) const FORMAT: i64 = 8;
-/// The format before [`FORMAT`], in which an evaluation has no pieces. A file with this format is read, and
-/// its format is changed to [`FORMAT`].
-pub(super) const FORMER: i64 = 7;
+pub(super) const FORMAT: i64 = 9;
+/// The formats before [`FORMAT`]: in the first an evaluation has no pieces, and in both bans are not lifted.
+/// A file with such a format is read, and its format is changed to [`FORMAT`].
+pub(super) const FORMER: [i64; 2] = [7, 8];
 /// Name of the file in the store's directory.
 pub(super) const FILE: &str = "osteon.sqlite";
 /// Name of the lock file, which names the process that has the store open.
@@ -163,7 +163,7 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
     let found: i64 = connection
         .query_row("SELECT version FROM format", [], |row| row.get(0))
         .map_err(refused)?;
-    if [FORMER, FORMAT].contains(&found) {
+    if found == FORMAT || FORMER.contains(&found) {
         Ok(())
     } else {
         Err(StoreError::Format { path: path.to_owned(), found, known: FORMAT })
@@ -210,7 +210,8 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
         transaction.execute_batch(SCHEMA)?;
     }
     transaction.execute_batch(evaluation_rows::TABLE)?;
-    transaction.execute("UPDATE format SET version = ?1 WHERE version = ?2", [FORMAT, FORMER])?;
+    transaction.execute_batch(ban_rows::TABLES)?;
+    transaction.execute("UPDATE format SET version = ?1", [FORMAT])?;
     transaction.execute_batch(parts::TABLE)?;
     parts::delete_of_ended(&transaction)?;
     evaluation_rows::delete_loose_pieces(&transaction)?;

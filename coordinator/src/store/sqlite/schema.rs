@@ -45,7 +45,7 @@ pub(super) const SCHEMA: &str = "
         history BLOB NOT NULL,           -- osteon.v1.HistoryBlock
         checksum BLOB NOT NULL
     );
-    CREATE TABLE ban (                    -- workers that were found to compute wrongly
+    CREATE TABLE ban (                    -- hosts of workers that were found to compute wrongly
         number INTEGER PRIMARY KEY,
         host TEXT NOT NULL,
         process INTEGER NOT NULL,

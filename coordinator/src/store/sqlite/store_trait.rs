@@ -7,9 +7,8 @@ use osteon_search::Summary;
 
 use super::SqliteStore;
 use crate::core::ids::JobId;
-use crate::core::worker_name::WorkerName;
 use crate::store::{
-    BanRecord, BetweenPieces, Changes, EndRecord, EvaluationRecord, JobRecord, PartRecord,
+    BanRecord, BetweenPieces, Changes, DoubtRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord,
     PieceRecord, Store, StoreError, StoredJob,
 };
 
@@ -94,12 +93,12 @@ impl Store for SqliteStore {
         (&*self).bans()
     }
 
-    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
-        (&*self).ended_jobs_of(worker)
+    fn doubts(&mut self) -> Result<Vec<DoubtRecord>, StoreError> {
+        (&*self).doubts()
     }
 
-    fn delete_bans(&mut self) -> Result<(), StoreError> {
-        (&*self).delete_bans()
+    fn reopen_job(&mut self, job: JobId) -> Result<Option<StoredJob>, StoreError> {
+        (&*self).reopen_job(job)
     }
 
     fn copy(&mut self, between: &mut BetweenPieces<'_>) -> Result<Option<File>, StoreError> {

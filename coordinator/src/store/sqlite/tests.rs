@@ -14,6 +14,7 @@ use osteon_common::results::{EstimatedError, EvaluationRole, GroupEnding, Status
 
 use super::acknowledged::MarkFile;
 use super::opening::{FILE, Journal, open_file};
+use crate::core::worker_name::WorkerName;
 use super::*;
 
 mod damage;
@@ -152,16 +153,46 @@ fn what_is_put_is_there_after_a_reopening() {
     assert_eq!(store.job(JobId(2)).unwrap(), Some(job(2)));
     assert_eq!(store.job(JobId(3)).unwrap(), None);
     assert_eq!(store.bans().unwrap(), [ban(1)]);
-    // Only process 0 has computed evaluation 1 of job 1, which has ended.
-    let ended_jobs_of = |store: &mut SqliteStore, host, process| {
-        store.ended_jobs_of(&WorkerName::new(host, process, 0)).unwrap()
-    };
-    assert_eq!(ended_jobs_of(&mut store, "a node", 0), [JobId(1)]);
-    for (host, process) in [("a node", 1), ("a", 0), ("node", 0), ("a nodes", 0), ("a node", 10)] {
-        assert_eq!(ended_jobs_of(&mut store, host, process), [], "{process} {host}");
+    assert_eq!(store.doubts().unwrap(), []);
+}
+
+#[test]
+fn a_ban_makes_the_ended_jobs_of_its_host_doubtful_until_they_are_begun_again() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    for id in [1, 2, 3] {
+        store.put_job(&job(id)).unwrap();
+        store.put_evaluation(&evaluation(id, 0), false).unwrap();
     }
-    store.delete_bans().unwrap();
-    assert_eq!(store.bans().unwrap(), []);
+    // Of which only this has been computed by anybody.
+    store.put_evaluation(&evaluation(1, 1), false).unwrap();
+    store.finish_job(&end(1), &summary(1)).unwrap();
+    let of = |number, host: &str| BanRecord { worker: WorkerName::new(host, 7, 0), ..ban(number) };
+    for (number, host) in (1..).zip(["a", "node", "a nodes", "A node", "1 a node", "a node"]) {
+        store.put_ban(&of(number, host)).unwrap();
+    }
+    let doubt = |ban, digest| DoubtRecord { job: JobId(1), ban, digest };
+    assert_eq!(store.doubts().unwrap(), [doubt(6, None)]);
+    // A repeated write, or one that lifts the ban, casts no new doubt: job 2 ended after it.
+    store.finish_job(&end(2), &summary(2)).unwrap();
+    let lifted = BanRecord { lifted: Some(Duration::from_secs(1_763_000_099)), ..of(6, "a node") };
+    store.put_ban(&lifted).unwrap();
+    assert_eq!((store.doubts().unwrap().len(), store.bans().unwrap().pop()), (1, Some(lifted)));
+
+    let reopened = store.reopen_job(JobId(1)).unwrap();
+    assert_eq!(reopened, Some(StoredJob { record: job(1), end: None, evaluations: 2 }));
+    assert_eq!(store.reopen_job(JobId(9)).unwrap(), None);
+    drop(store);
+    let mut store = SqliteStore::open(directory.path()).unwrap();
+    assert_eq!(store.doubts().unwrap(), [doubt(6, Some(summary(1).digest))]);
+    assert_eq!((store.jobs().unwrap()[0].end.clone(), store.summary(JobId(1)).unwrap()), (None, None));
+    // The first digest remains if it is begun again once more.
+    store.finish_job(&end(1), &summary(3)).unwrap();
+    store.reopen_job(JobId(1)).unwrap();
+    assert_eq!(store.doubts().unwrap(), [doubt(6, Some(summary(1).digest))]);
+    store.finish_job(&end(1), &summary(3)).unwrap();
+    store.delete_jobs(&[JobId(1)]).unwrap();
+    assert_eq!(store.doubts().unwrap(), []);
 }
 
 #[test]
@@ -239,6 +270,7 @@ fn ban(number: u64) -> BanRecord {
         job: JobId(2),
         reason: "answered wrongly".to_owned(),
         at: Duration::from_secs(1_763_000_050),
+        lifted: None,
     }
 }
 
@@ -402,14 +434,14 @@ fn a_second_coordinator_is_refused() {
 
 #[test]
 fn another_format_is_refused() {
-    for version in [1, 6, 9] {
+    for version in [1, 6, 10] {
         let directory = tempfile::tempdir().unwrap();
         let store = SqliteStore::open(directory.path()).unwrap();
         store.connection.execute("UPDATE format SET version = ?1", [version]).unwrap();
         drop(store);
         let error = SqliteStore::open(directory.path()).unwrap_err();
         let expected = format!(
-            "osteon.sqlite: this store has format {version}; this version writes 8: run the version \
+            "osteon.sqlite: this store has format {version}; this version writes 9: run the version \
              that wrote it, or choose another directory"
         );
         assert!(error.to_string().ends_with(&expected), "{error}");

@@ -12,13 +12,12 @@
 use osteon_common::parameters::Point;
 use osteon_search::same_point;
 
-use super::batches;
+use super::{batches, proofs};
 use crate::core::ahead::{FollowedBranch, PreparedEvaluation};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::JobId;
 use crate::core::job::{Job, Stage};
 use crate::core::reactor::turn::Turn;
-use crate::core::worker_name::WorkerName;
 use crate::store::EvaluationRecord;
 
 /// Begins evaluations of further parts of a job's search until one waits to be sent.
@@ -72,6 +71,7 @@ pub(crate) fn keep_if_awaited(job: &mut Job, record: &EvaluationRecord) {
 
 /// Takes in a complete evaluation of a branch, if `attempt` is one, and begins the next.
 pub(crate) fn settle(turn: &mut Turn, id: JobId, attempt: u64) {
+    proofs::clear(turn, id, attempt);
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
@@ -122,13 +122,13 @@ pub(crate) fn drop_last(turn: &mut Turn) -> bool {
     true
 }
 
-/// Drops everything that may contain answers of a banned worker.
-pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
+/// Drops everything that may contain answers of a banned host.
+pub(crate) fn forget(turn: &mut Turn, id: JobId, host: &str) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     let gone: Vec<u64> = job.ahead.evaluations().map(|it| it.attempt).collect();
-    job.ahead.forget(name);
+    job.ahead.forget(host);
     batches::revoke_attempts(turn, id, &gone);
 }
 

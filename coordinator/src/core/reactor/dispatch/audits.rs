@@ -1,10 +1,14 @@
 //! Chooses the workers for audits and tie-breakers.
 
-use super::{batches, poison, schedule, sizing};
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use super::{batches, overdue, poison, schedule, sizing};
+use crate::core::ballot::VOTERS_MAX;
 use crate::core::batch::{Assignment, Purpose};
 use crate::core::dispute::Dispute;
 use crate::core::evaluation::Audit;
-use crate::core::ids::{JobId, WorkerId};
+use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, State};
 use crate::core::worker_name::WorkerName;
@@ -12,16 +16,16 @@ use crate::core::worker_name::WorkerName;
 /// Sends a worker a tie-breaker or an audit that it is eligible for, if there is one; disputes come
 /// first.
 pub(crate) fn hand_check(turn: &mut Turn, worker: WorkerId) -> bool {
-    let Some(name) = turn.state.workers.get(&worker).map(|worker| worker.name.clone()) else {
+    let Some(attached) = turn.state.workers.get(&worker) else {
         return false;
     };
-    let on_probation = turn.state.probation.has(&name);
+    let (name, is_checker) = (attached.name.clone(), turn.state.is_checker(attached));
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
     for job in active {
         if let Some(at) = dispute_for(turn.state, job, worker) {
             return hand_dispute(turn, job, at, worker);
         }
-        if on_probation {
+        if !is_checker {
             continue;
         }
         if let Some((audit, attempt)) = audit_for(turn.state, job, worker, &name) {
@@ -42,7 +46,7 @@ fn audit_for(
     worker: WorkerId,
     name: &WorkerName,
 ) -> Option<(Audit, u64)> {
-    let of_others = |audit: &Audit| audit.by != *name;
+    let of_others = |audit: &Audit| audit.by.host() != name.host();
     let (attempt, at, audited) = state.jobs.get(&job)?.certain().find_map(|evaluation| {
         let at = evaluation.audits.iter().position(of_others)?;
         Some((evaluation.attempt, at, evaluation.audits.get(at)?.indices.count))
@@ -66,19 +70,49 @@ fn audit_for(
     Some((part, attempt))
 }
 
-/// Returns the first dispute of a job that this worker shall decide: one for which no eligible
-/// worker has a better reputation.
+/// Returns the first dispute of a job on which the host of this worker shall vote: one that lacks votes,
+/// and for which no eligible worker has a better reputation.
 fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let worker = state.workers.get(&worker)?;
     let is_for = |dispute: &Dispute| {
         let reputation =
             |worker: &AttachedWorker| poison::reputation(state, worker, &dispute.crashes);
-        let may = |worker: &&AttachedWorker| !worker.draining && !dispute.has_vote_of(&worker.name);
+        let asked = dispute.tie_breakers.iter().filter_map(|id| state.batches.get(id));
+        let asked: Vec<&str> = asked
+            .filter_map(|batch| Some(state.workers.get(&batch.worker)?.name.host()))
+            .collect();
+        let may = |worker: &&AttachedWorker| {
+            let host = worker.name.host();
+            !worker.draining && !dispute.has_vote_of(host) && !asked.contains(&host)
+        };
         let best = state.workers.values().filter(may).map(reputation).min();
-        dispute.tie_breakers.is_empty() && may(&worker) && best == Some(reputation(worker))
+        lacks_votes(state, dispute) && may(&worker) && best == Some(reputation(worker))
     };
     evaluation.disputes.iter().position(is_for)
+}
+
+/// Returns whether a dispute needs more votes than are on their way.
+pub(crate) fn lacks_votes(state: &State, dispute: &Dispute) -> bool {
+    // At least one more: without it there would be no dispute.
+    let lacks = dispute.ballot.lacks(voters(state, dispute, None)).max(1);
+    dispute.tie_breakers.len() < lacks
+}
+
+/// Returns the number of hosts that may decide a dispute: those that have voted, and those with workers that
+/// answer batches, at most as many as are asked. With the time, hosts do not count that were asked and have
+/// not answered for too long.
+pub(crate) fn voters(state: &State, dispute: &Dispute, now: Option<Duration>) -> usize {
+    let is_late =
+        |id: &&BatchId| now.is_some_and(|now| overdue::is_overdue(state, **id, now));
+    let late = dispute.tie_breakers.iter().filter(is_late).filter_map(|id| state.batches.get(id));
+    let late: Vec<WorkerId> = late.map(|batch| batch.worker).collect();
+    let answers = |(id, worker): &(&WorkerId, &AttachedWorker)| {
+        state.is_checker(worker) && worker.missed.count == 0 && !late.contains(id)
+    };
+    let attached = state.workers.iter().filter(answers).map(|(_, worker)| worker.name.host());
+    let hosts: BTreeSet<&str> = attached.chain(dispute.ballot.hosts()).collect();
+    hosts.len().min(VOTERS_MAX)
 }
 
 /// Sends a worker the tie-breaker of a dispute.
@@ -86,7 +120,7 @@ fn hand_dispute(turn: &mut Turn, job: JobId, at: usize, worker: WorkerId) -> boo
     let Some(evaluation) = turn.state.evaluation_mut(job) else {
         return false;
     };
-    let (attempt, indices) = (evaluation.attempt, evaluation.disputes[at].indices);
+    let (attempt, indices) = (evaluation.attempt, evaluation.disputes[at].indices());
     let assignment = Assignment { job, attempt, indices };
     let batch = batches::send(turn, worker, assignment, Purpose::TieBreak);
     if let Some(evaluation) = turn.state.evaluation_mut(job) {

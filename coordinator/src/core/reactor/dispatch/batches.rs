@@ -1,8 +1,6 @@
 //! Sends batches, revokes them, and returns the indices of lost workers' batches to the queue.
 
-use std::time::Duration;
-
-use super::departures;
+use super::{departures, proofs};
 use crate::core::ahead::Ahead;
 use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::crashes::{Cause, LostWorker};
@@ -25,20 +23,11 @@ pub(crate) fn send(
     purpose: Purpose,
 ) -> Option<BatchId> {
     let work = turn.state.work(&assignment)?;
+    proofs::ask_before(turn, worker, assignment.job);
     preempt_if_full(turn, worker, assignment.indices.count);
     let id = BatchId(turn.state.next_batch);
     turn.state.next_batch += 1;
-    let batch = Batch {
-        assignment,
-        purpose,
-        worker,
-        sent: turn.now,
-        begun: turn.now,
-        charged: Duration::ZERO,
-        duplicates: Vec::new(),
-        retries: 0,
-    };
-    turn.state.batches.insert(id, batch);
+    turn.state.batches.insert(id, Batch::new(assignment, purpose, worker, turn.now));
     if let Some(worker) = turn.state.workers.get_mut(&worker) {
         worker.in_flight.push(id);
     }
@@ -116,10 +105,15 @@ pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &LostWor
         return;
     }
     let Batch { assignment, purpose, duplicates, .. } = settled;
+    let is_blameless = purpose != Purpose::Exclusive && is_blameless(state, loss);
     let Some(evaluation) = state.evaluation_of_mut(&assignment) else {
         return;
     };
     let indices = assignment.indices;
+    if is_blameless && duplicates.is_empty() {
+        evaluation.put_back(indices);
+        return;
+    }
     evaluation.has_crashed_worker |= loss.cause != Cause::Announced;
     if !duplicates.is_empty() {
         if purpose == Purpose::Exclusive {
@@ -132,6 +126,18 @@ pub(crate) fn give_back_orphan(state: &mut State, batch: BatchId, loss: &LostWor
     } else {
         evaluation.quarantine(indices.first, loss);
     }
+}
+
+/// Returns whether no batch is to blame for a loss: the workers of this host are lost whatever they hold, while
+/// others answer. Their batches are not made smaller, so that a host whose workers come and go leaves no
+/// evaluation in pieces.
+fn is_blameless(state: &State, loss: &LostWorker) -> bool {
+    let answers = |worker: &AttachedWorker| {
+        worker.has_answered && state.is_sound(worker) && !state.is_failing(worker.name.host())
+    };
+    !loss.has_answered
+        && state.is_failing(loss.worker.host())
+        && state.workers.values().any(answers)
 }
 
 /// Revokes the speculative batches of a worker that has no free slots for `count` more realizations

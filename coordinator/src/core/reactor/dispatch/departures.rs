@@ -21,6 +21,15 @@ pub(crate) fn dismiss_if_drained(turn: &mut Turn, worker: WorkerId) {
 /// the batches that it held to the queue.
 pub(crate) fn depart(turn: &mut Turn, worker: WorkerId, why: Departure) -> Option<AttachedWorker> {
     let gone = turn.state.workers.remove(&worker)?;
+    for proof in &gone.proofs {
+        turn.state.settle(*proof);
+    }
+    if let Some(count) = turn.state.hosts.get_mut(gone.name.host()) {
+        *count -= 1;
+        if *count == 0 {
+            turn.state.hosts.remove(gone.name.host());
+        }
+    }
     turn.state.came_or_went(worker);
     if turn.state.workers.is_empty() {
         turn.state.no_worker_since = turn.now;

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
+use super::overdue::DUPLICATES_MAX;
 use super::{batches, eta};
-use crate::core::batch::Batch;
+use crate::core::batch::{Batch, Purpose};
 use crate::core::ids::{BatchId, WorkerId};
 use crate::core::reactor::turn::Turn;
 use crate::core::service_order::ServicePlace;
@@ -46,11 +47,18 @@ fn duplicate(
         }
         // Those that hold least come first; the duplicate makes the worker busy.
         let first = state.order.iter().next();
+        let sound = |place: &ServicePlace| {
+            state.workers.get(&place.worker).is_some_and(|worker| !state.may_be_silent(worker))
+        };
         let Some(idle) = first.filter(|place| !place.on_probation && idle(place)) else {
             return;
         };
+        let is_sound = sound(&idle);
         // This walks over all batches, so it is done only when a worker is idle.
-        let is_worth = |(_, batch): &(BatchId, &Batch)| old(batch, now) && worth(state, batch);
+        // Only a worker that answers gets a copy of what others may not answer.
+        let is_worth = |(_, batch): &(BatchId, &Batch)| {
+            old(batch, now) && worth(state, batch) && (is_sound || batch.duplicates.is_empty())
+        };
         let Some((slowest, _)) = open(state).find(is_worth) else {
             return;
         };
@@ -60,10 +68,21 @@ fn duplicate(
     }
 }
 
-/// Returns the batches that may be duplicated before they are overdue, in the order they were sent.
+/// Returns the batches that may be duplicated before they are overdue, in the order they were sent: those
+/// without duplicates, and those of which all copies are out at workers that may be silent.
 fn open(state: &State) -> impl Iterator<Item = (BatchId, &Batch)> {
     let batches = state.batches.iter().map(|(id, batch)| (*id, batch));
-    batches.filter(|(_, batch)| batch.may_be_duplicated())
+    batches.filter(|(id, batch)| {
+        batch.purpose == Purpose::Fill
+            && (batch.duplicates.is_empty()
+                || (batch.duplicates.len() + 1 < DUPLICATES_MAX
+                    && batch.duplicates.iter().chain([id]).all(|copy| may_be_silent(state, *copy))))
+    })
+}
+
+fn may_be_silent(state: &State, batch: BatchId) -> bool {
+    let holder = state.batches.get(&batch).and_then(|batch| state.workers.get(&batch.worker));
+    holder.is_some_and(|holder| state.may_be_silent(holder))
 }
 
 /// Sends a worker a duplicate of a batch and returns its number, if its evaluation is under way.

@@ -53,7 +53,8 @@ pub(crate) fn tick(turn: &mut Turn) {
     let waits = |id: &BatchId| {
         turn.state.batches.get(id).is_some_and(|batch| {
             let newest = batch.duplicates.iter().all(|duplicate| duplicate < id);
-            let asked_for = batch.purpose != Purpose::Speculative;
+            // Nobody else can give the proof of a worker.
+            let asked_for = !matches!(batch.purpose, Purpose::Speculative | Purpose::Proof);
             newest && asked_for && batch.duplicates.len() + 1 < DUPLICATES_MAX
         })
     };
@@ -64,7 +65,7 @@ pub(crate) fn tick(turn: &mut Turn) {
 }
 
 /// Returns whether a batch is overdue.
-fn is_overdue(state: &State, id: BatchId, now: Duration) -> bool {
+pub(crate) fn is_overdue(state: &State, id: BatchId, now: Duration) -> bool {
     state.batches.get(&id).is_some_and(|batch| {
         let waited = now.saturating_sub(batch.begun);
         let factor = 2_u32.saturating_pow(batch.retries);
@@ -188,13 +189,19 @@ fn holds_anything(state: &State, worker: WorkerId) -> bool {
 /// Chooses which of the workers in `free` gets a duplicate of a batch.
 fn choose_worker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
     let rank = |(worker, choose_worker): &(&AttachedWorker, WorkerId)| {
-        let doubtful = worker.missed.count > 0 || !worker.has_answered;
+        let doubtful = state.may_be_silent(worker);
         let on_probation = !state.is_sound(worker);
         let of_holder = is_of_holder(state, id, worker);
         (on_probation, doubtful, of_holder, state.held(worker), *choose_worker)
     };
+    // Who has never answered anything gets no copy while another worker is there that has, busy or not.
+    let answers = |worker: &AttachedWorker| {
+        worker.has_answered && state.is_sound(worker) && may_have(state, id, &worker.name)
+    };
+    let any_answers = state.workers.values().any(answers);
     let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
-    let fit = free.filter(|(worker, _)| is_fit(state, id, worker, now));
+    let known = free.filter(|(worker, _)| worker.has_answered || !any_answers);
+    let fit = known.filter(|(worker, _)| is_fit(state, id, worker, now));
     fit.min_by_key(rank).map(|(_, choose_worker)| choose_worker)
 }
 
@@ -267,8 +274,8 @@ fn is_of_holder(state: &State, id: BatchId, worker: &AttachedWorker) -> bool {
 }
 
 /// Returns whether a worker is eligible for a duplicate of a batch. A worker that holds the batch
-/// or a duplicate is not, nor is the worker that the batch audits, nor one that has voted in the
-/// dispute that it decides.
+/// or a duplicate is not, nor is one of the host that the batch audits, nor one of a host that has voted in
+/// the dispute that it decides.
 fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
     let Some(batch) = state.batches.get(&id) else {
         return false;
@@ -279,14 +286,18 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
     let about = |it: &&Dispute| it.tie_breakers.contains(&id);
     let in_question = match batch.purpose {
         Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => false,
+        Purpose::Proof => true,
         Purpose::Audit { .. } => {
-            evaluation.owner(batch.assignment.indices.first).is_none_or(|by| by == *name)
+            let by = evaluation.owner(batch.assignment.indices.first);
+            by.is_none_or(|by| by.host() == name.host())
         }
         Purpose::TieBreak => {
-            evaluation.disputes.iter().find(about).is_none_or(|it| it.has_vote_of(name))
+            evaluation.disputes.iter().find(about).is_none_or(|it| it.has_vote_of(name.host()))
         }
     };
-    !in_question && holders(state, id).all(|holder| holder != name)
+    let is_check = !batch.purpose.fills();
+    let in_common = |holder: &WorkerName| holder == name || (is_check && holder.host() == name.host());
+    !in_question && !holders(state, id).any(in_common)
 }
 
 /// Sends a worker a duplicate of an overdue batch.
@@ -308,7 +319,7 @@ fn send(turn: &mut Turn, id: BatchId, to: WorkerId) {
     }
     if let Some(evaluation) = turn.state.evaluation_of_mut(&assignment) {
         match purpose {
-            Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => {}
+            Purpose::Fill | Purpose::Exclusive | Purpose::Speculative | Purpose::Proof => {}
             Purpose::Audit { .. } => evaluation.audits_out += 1,
             Purpose::TieBreak => {
                 for dispute in &mut evaluation.disputes {

@@ -82,11 +82,11 @@ pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
     keep(turn, id, Vec::new());
 }
 
-/// Drops the speculative evaluations of a job that contain answers of a banned worker.
-pub(crate) fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
+/// Drops the speculative evaluations of a job that contain answers of a banned host.
+pub(crate) fn forget(turn: &mut Turn, id: JobId, host: &str) {
     let contributed = |evaluation: &PendingEvaluation| {
-        evaluation.workers.contains(name)
-            || evaluation.disputes.iter().any(|dispute| dispute.has_vote_of(name))
+        WorkerName::any_of(&evaluation.workers, host)
+            || evaluation.disputes.iter().any(|dispute| dispute.has_vote_of(host))
     };
     retain(turn, id, |evaluation| !contributed(evaluation));
 }

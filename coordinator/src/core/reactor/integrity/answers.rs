@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use osteon_common::carried_velocity::carried_velocities;
 use osteon_common::outcome::RealizationResult;
 use osteon_proto::malformed::Malformed;
 
@@ -15,7 +16,7 @@ use crate::core::job::Job;
 use crate::core::reactor::dispatch::{batches, departures, overdue};
 use crate::core::reactor::lifecycle::{jobs, workers};
 use crate::core::reactor::turn::Turn;
-use crate::core::state::State;
+use crate::core::state::{EarlyAnswer, State};
 use crate::core::worker_name::WorkerName;
 
 /// Weight of the newest measurement in a worker's rate.
@@ -58,7 +59,15 @@ pub(crate) fn answered(
         workers::close(turn, worker, CloseReason::Malformed(reason));
         return;
     }
+    if let Some(reason) = implausible(turn.state, &assignment, &solved) {
+        workers::close(turn, worker, reason);
+        return;
+    }
     turn.state.note_answer(worker);
+    if purpose.is_some() && waits_for_proof(turn.state, worker, &assignment) {
+        hold_back(turn.state, worker, EarlyAnswer { batch, solved, elapsed_s });
+        return;
+    }
     if purpose.is_some() {
         overdue::answered(turn.state, worker, batch, turn.now);
     }
@@ -69,7 +78,7 @@ pub(crate) fn answered(
             }
             take_back(turn, duplicates);
             fill(turn.state, &assignment, &solved, &name, turn.now);
-            checks::audit(turn.state, &assignment, &name);
+            checks::audit(turn.state, worker, batch, &assignment);
         }
         Some(Purpose::Audit { .. }) => {
             turn.state.settle(batch);
@@ -79,6 +88,11 @@ pub(crate) fn answered(
         Some(Purpose::TieBreak) => {
             take_back(turn, duplicates);
             checks::tie_broken(turn, batch, &assignment, solved, &name);
+        }
+        Some(Purpose::Proof) => {
+            learn_pace(turn.state, &assignment, worker, elapsed_s);
+            checks::proven(turn, (worker, batch), &assignment, solved, &name);
+            take_early(turn, worker);
         }
         None => checks::compare(turn, &assignment, &solved, &name),
     }
@@ -91,6 +105,63 @@ fn lacks_decays(state: &State, assignment: &Assignment, solved: &[RealizationRes
     let job = state.jobs.get(&assignment.job);
     job.is_some_and(|job| job.record.specification.has_decays())
         && solved.iter().any(|one| one.outcome.is_ok() && one.decay.to_bits() == 0)
+}
+
+/// Returns whether a worker has not given its proof of the setup of a batch that it answers.
+fn waits_for_proof(state: &State, worker: WorkerId, assignment: &Assignment) -> bool {
+    let Some(attached) = state.workers.get(&worker) else {
+        return false;
+    };
+    let setup = state.jobs.get(&assignment.job).map(|job| job.setup);
+    let mut proofs = attached.proofs.iter().filter_map(|id| state.batches.get(id));
+    proofs.any(|proof| {
+        let of = state.proofs.with_attempt(proof.assignment.attempt);
+        proof.assignment.attempt != assignment.attempt && of.map(|(of, _)| of) == setup
+    })
+}
+
+/// Keeps an answer until its worker has given its proof. The batch counts as not answered meanwhile.
+fn hold_back(state: &mut State, worker: WorkerId, answer: EarlyAnswer) {
+    if let Some(attached) = state.workers.get_mut(&worker)
+        && attached.early.iter().all(|early| early.batch != answer.batch)
+    {
+        attached.early.push(answer);
+    }
+}
+
+/// Takes in the answers that waited for the proof of their worker.
+fn take_early(turn: &mut Turn, worker: WorkerId) {
+    let attached = turn.state.workers.get_mut(&worker);
+    let early = attached.map(|attached| std::mem::take(&mut attached.early));
+    for EarlyAnswer { batch, solved, elapsed_s } in early.unwrap_or_default() {
+        answered(turn, worker, batch, solved, elapsed_s);
+    }
+}
+
+/// Returns why answers cannot be right: a velocity is beyond what the layers of the job can carry.
+fn implausible(
+    state: &State,
+    assignment: &Assignment,
+    solved: &[RealizationResult],
+) -> Option<CloseReason> {
+    let layers = &state.jobs.get(&assignment.job)?.record.specification.setup.layers;
+    let of_proof = || Some(state.proofs.with_attempt(assignment.attempt)?.1.point());
+    let point = state.evaluation_of(assignment).map(|it| it.point).or_else(of_proof)?;
+    let carried = carried_velocities(layers, &point)?;
+    let mut velocities = solved.iter().filter_map(|one| one.outcome.ok());
+    let velocity = velocities.find(|velocity| !carried.contains(velocity))?;
+    Some(CloseReason::ImpossibleVelocity { velocity })
+}
+
+/// Learns from a proof how long realizations of its job take.
+fn learn_pace(state: &mut State, assignment: &Assignment, worker: WorkerId, elapsed_s: f64) {
+    let slots = state.workers.get(&worker).map(|attached| attached.hello.slots);
+    if let Some((job, slots)) = state.jobs.get_mut(&assignment.job).zip(slots)
+        && elapsed_s.is_finite()
+        && elapsed_s >= ELAPSED_MIN_S
+    {
+        job.pace.learn(assignment.indices.count, slots, elapsed_s);
+    }
 }
 
 /// Revokes the duplicates of a batch that was answered.

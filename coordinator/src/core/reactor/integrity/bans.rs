@@ -1,5 +1,5 @@
-//! Bans of workers that return wrong answers: a banned worker is refused from then on, and the
-//! evaluations with its answers are computed again.
+//! Bans of hosts whose workers return wrong answers: they are refused until an operator lifts the ban, and
+//! the evaluations with their answers are computed again.
 
 use crate::core::close_reason::CloseReason;
 use crate::core::effect::{Effect, Record};
@@ -13,42 +13,45 @@ use crate::core::state::Banned;
 use crate::core::worker_name::WorkerName;
 use crate::store::BanRecord;
 
-/// Bans a worker for a wrong answer found in `job`; `reason` completes the sentence "it …".
+/// Bans the host of a worker for a wrong answer found in `job`; `reason` completes the sentence "it …".
 pub(crate) fn ban(turn: &mut Turn, name: &WorkerName, job: JobId, reason: String) {
-    if turn.state.ban(name).is_some() {
+    let host = name.host();
+    if turn.state.ban(host).is_some() {
         return;
     }
-    tracing::error!(worker = %name, %job, %reason, "a worker is banned");
+    tracing::error!(host, worker = %name, %job, %reason, "a host is banned");
     let number = turn.state.banned.last().map_or(1, |last| last.record.number + 1);
     let worker = name.clone();
-    let record = BanRecord { number, worker, job, reason: reason.clone(), at: turn.now };
+    let (reason, at, lifted) = (reason.clone(), turn.now, None);
+    let record = BanRecord { number, worker, job, reason: reason.clone(), at, lifted };
     turn.effects.push(Effect::Store(Record::Ban(record.clone())));
     let store_at = Some(turn.now + turn.state.config.store_retry);
     turn.state.banned.push(Banned { record, store_at, refused: false });
+    turn.state.proofs.withdraw(host);
     let unfinished: Vec<JobId> = turn.state.jobs.keys().copied().collect();
     for job in unfinished {
-        forget(turn, job, name);
+        forget(turn, job, host);
     }
-    let stays = turn.state.workers.iter().filter(|(_, worker)| worker.name == *name);
+    let stays = turn.state.workers.iter().filter(|(_, worker)| worker.name.host() == host);
     let stays: Vec<WorkerId> = stays.map(|(id, _)| *id).collect();
     for stay in stays {
         // Its batches are not to blame for the end of its stay.
         workers::begin_draining(turn.state, stay);
-        let reason = CloseReason::Banned { reason: reason.clone() };
+        let reason = CloseReason::Banned { host: host.to_owned(), reason: reason.clone() };
         workers::close(turn, stay, reason);
     }
 }
 
-/// Removes the answers of a worker from a job.
-fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
-    speculation::forget(turn, id, name);
-    ahead::forget(turn, id, name);
+/// Removes the answers of a host from a job.
+fn forget(turn: &mut Turn, id: JobId, host: &str) {
+    speculation::forget(turn, id, host);
+    ahead::forget(turn, id, host);
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    job.saved.forget(name);
+    job.saved.forget(host);
     turn.state.changed.insert(id);
-    let contributed = job.workers.contains(name);
+    let contributed = WorkerName::any_of(&job.workers, host);
     match &mut job.stage {
         Stage::Computing(_)
         | Stage::Completing(_)
@@ -58,16 +61,16 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
         {
             jobs::restart(turn, id);
         }
-        Stage::Computing(evaluation) if evaluation.workers.contains(name) => {
+        Stage::Computing(evaluation) if WorkerName::any_of(&evaluation.workers, host) => {
             compute_again(turn, id);
         }
-        Stage::Completing(settled) if settled.workers.contains(name) => {
+        Stage::Completing(settled) if WorkerName::any_of(&settled.workers, host) => {
             compute_again(turn, id);
         }
         Stage::Computing(evaluation) => {
             let mut over = Vec::new();
             evaluation.disputes.retain_mut(|dispute| {
-                let stays = dispute.forget(name);
+                let stays = dispute.forget(host);
                 if !stays {
                     over.append(&mut dispute.tie_breakers);
                 }
@@ -78,7 +81,7 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
             }
         }
         Stage::StoringEvaluation { record, .. } => {
-            job.restart_pending |= contributed || record.workers.contains(name);
+            job.restart_pending |= contributed || WorkerName::any_of(&record.workers, host);
             if job.restart_pending {
                 // The search may continue elsewhere after its restart.
                 speculation::drop_all(turn, id);
@@ -86,7 +89,7 @@ fn forget(turn: &mut Turn, id: JobId, name: &WorkerName) {
             }
         }
         Stage::StoringPrepared { records, .. } => {
-            let of_records = records.iter().any(|record| record.workers.contains(name));
+            let of_records = records.iter().any(|it| WorkerName::any_of(&it.workers, host));
             job.restart_pending |= contributed || of_records;
             if job.restart_pending {
                 ahead::drop_all(turn, id);
@@ -144,7 +147,7 @@ pub(crate) fn store_failed(turn: &mut Turn, number: u64, error: String) {
     let found = turn.state.banned.iter_mut().find(|banned| banned.record.number == number);
     if let Some(banned) = found {
         banned.refused = true;
-        let since = banned.record.at;
+        let since = banned.record.lifted.unwrap_or(banned.record.at);
         records::report_store_failure_if_persistent(turn, since, error);
     }
 }

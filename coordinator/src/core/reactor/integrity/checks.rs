@@ -4,33 +4,50 @@
 use std::time::Duration;
 
 use osteon_common::outcome::RealizationResult;
+use osteon_common::parameters::{BONE_PARAMETERS, Point};
 
 use super::bans;
 use crate::core::audit;
+use crate::core::ballot::{Ballot, Cast, Contradiction, Verdict, Vote};
 use crate::core::batch::Assignment;
-use crate::core::dispute::{Contradiction, Dispute, Vote, VoteResult};
+use crate::core::dispute::Dispute;
 use crate::core::evaluation::{Audit, PendingEvaluation};
 use crate::core::failure::{RunFailure, shown};
-use crate::core::ids::{BatchId, JobId};
+use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::Job;
-use crate::core::reactor::dispatch::{overdue, poison};
+use crate::core::proofs::SetupKey;
+use crate::core::reactor::dispatch::{audits, batches, overdue, poison, proofs};
 use crate::core::reactor::lifecycle::jobs;
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
 use crate::core::worker_name::WorkerName;
 
-/// Queues an audit of a batch that `by` has just answered, if the batch is chosen for one and
-/// another worker can compute it.
-pub(crate) fn audit(state: &mut State, assignment: &Assignment, by: &WorkerName) {
+/// Number of hosts that the reason for a ban names.
+const HOSTS_SHOWN_MAX: usize = 3;
+
+/// Queues an audit of a part of a batch that a worker has just answered, if one is due and another host
+/// can compute it.
+pub(crate) fn audit(state: &mut State, worker: WorkerId, batch: BatchId, assignment: &Assignment) {
     let (key, fraction) = (state.config.audit_key, state.config.audit_fraction);
-    if !state.answers_batches(|name| name != by) {
+    let Some(host) = state.workers.get(&worker).map(|attached| attached.name.host()) else {
+        return;
+    };
+    if fraction <= 0.0 || !state.can_check(host) {
         return;
     }
-    let Assignment { job, indices, .. } = *assignment;
-    if let Some(evaluation) = state.evaluation_of_mut(assignment)
-        && audit::is_chosen(&key, job, evaluation.number, indices.first, fraction)
+    let Some(attached) = state.workers.get_mut(&worker) else {
+        return;
+    };
+    let slots = attached.hello.slots;
+    let (chosen, left) =
+        audit::choose((&key, fraction), (batch, slots), assignment.indices, attached.until_audit);
+    attached.until_audit = Some(left);
+    let by = attached.name.clone();
+    if let Some(indices) = chosen
+        && let Some(evaluation) = state.evaluation_of_mut(assignment)
     {
-        evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
+        evaluation.vouch(&by);
+        evaluation.audits.push_back(Audit { indices, by, lost: 0 });
     }
 }
 
@@ -47,23 +64,91 @@ pub(crate) fn compare(
     let Some((indices, votes)) = evaluation.compare(assignment.indices, solved, by) else {
         return;
     };
-    let [earlier, later] = &votes;
-    if earlier.by == later.by {
-        let dispute = Dispute::new(indices, votes.clone(), turn.now);
-        let what = dispute.contradiction().map_or_else(String::new, |it| {
-            let [(_, earlier), (_, later)] = it.answers;
-            format!("realization {} as {} and as {}", it.index, shown(earlier), shown(later))
-        });
-        let reason = format!("answered {what}");
-        bans::ban(turn, by, assignment.job, reason);
+    let hosts = [0, 1].map(|i| votes[i].by.host().to_owned());
+    let Some(dispute) = Dispute::new(indices, votes.clone(), turn.now) else {
+        let mut ballot = Ballot::new(indices);
+        for vote in votes {
+            if let Cast::Contradicts(found) = ballot.cast(vote) {
+                contradicts_itself(turn, assignment.job, by, *found);
+            }
+        }
         return;
+    };
+    let evaluation = turn.state.evaluation_of_mut(assignment);
+    let Some(evaluation) = evaluation else {
+        return;
+    };
+    let is_known = |it: &Dispute| hosts.iter().all(|host| it.has_vote_of(host));
+    if !evaluation.disputes.iter().any(is_known) {
+        tracing::warn!(job = %assignment.job, one = hosts[0], other = hosts[1],
+            first = indices.first, "two hosts answer differently; others decide");
+        evaluation.disputes.push(dispute);
     }
-    let known =
-        |dispute: &Dispute| dispute.has_vote_of(&earlier.by) && dispute.has_vote_of(&later.by);
-    if !evaluation.disputes.iter().any(known) {
-        tracing::warn!(job = %assignment.job, one = %earlier.by, other = %later.by,
-            first = indices.first, "two workers answer differently; a third decides");
-        evaluation.disputes.push(Dispute::new(indices, votes, turn.now));
+}
+
+/// Bans a host that has given two answers to the same realization. If there is no other host, the job
+/// fails instead: nobody could compute it.
+pub(crate) fn contradicts_itself(
+    turn: &mut Turn,
+    job: JobId,
+    by: &WorkerName,
+    contradiction: Contradiction,
+) {
+    let [(_, earlier), (_, later)] = contradiction.answers;
+    if turn.state.several_hosts() {
+        let what = format!("{} and as {}", shown(earlier), shown(later));
+        let reason = format!("answered realization {} as {what}", contradiction.index);
+        bans::ban(turn, by, job, reason);
+    } else {
+        let point = turn.state.jobs.get(&job).map(|job| job.record.specification.start());
+        let point = point.unwrap_or_else(|| Point::of_bone([0.0; BONE_PARAMETERS]));
+        let contradiction = Box::new(contradiction);
+        jobs::fail(turn, job, &RunFailure::Contradiction { contradiction, point });
+    }
+}
+
+/// Takes in the proof of a worker.
+pub(crate) fn proven(
+    turn: &mut Turn,
+    (worker, batch): (WorkerId, BatchId),
+    assignment: &Assignment,
+    solved: Vec<RealizationResult>,
+    by: &WorkerName,
+) {
+    let setup = turn.state.proofs.with_attempt(assignment.attempt).map(|(setup, _)| setup);
+    turn.state.settle(batch);
+    let Some(setup) = setup else {
+        return;
+    };
+    if let Some(attached) = turn.state.workers.get_mut(&worker) {
+        attached.proven.insert(setup);
+    }
+    let Some(proofs) = turn.state.proofs.of_mut(&setup) else {
+        return;
+    };
+    proofs.give(by);
+    match proofs.ballot.cast(Vote { by: by.clone(), solved }) {
+        Cast::Counted => decide_proofs(turn, &setup),
+        Cast::Contradicts(found) => contradicts_itself(turn, assignment.job, by, *found),
+    }
+}
+
+/// Bans the hosts whose proofs of a setup differ from that of the majority, and lets evaluations continue
+/// that waited for it.
+pub(crate) fn decide_proofs(turn: &mut Turn, setup: &SetupKey) {
+    let voters = proofs::voters(turn.state, setup, turn.now);
+    let verdict = turn.state.proofs.of(setup).and_then(|proofs| proofs.ballot.verdict(voters));
+    let of_setup = |id: &&JobId| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup);
+    let jobs: Vec<JobId> = turn.state.active.iter().filter(of_setup).copied().collect();
+    if let Some((verdict, job)) = verdict.zip(jobs.first()) {
+        ban_outvoted(turn, *job, verdict);
+    }
+    for id in jobs {
+        let attempts = turn.state.jobs.get(&id).into_iter().flat_map(Job::certain);
+        let attempts: Vec<u64> = attempts.map(|evaluation| evaluation.attempt).collect();
+        for attempt in attempts {
+            jobs::settle(turn, id, attempt);
+        }
     }
 }
 
@@ -82,21 +167,43 @@ pub(crate) fn tie_broken(
     let Some((at, evaluation)) = at.zip(turn.state.evaluation_of_mut(assignment)) else {
         return;
     };
-    let dispute = &mut evaluation.disputes[at];
-    if let Some(result) = dispute.vote(Vote { by: by.clone(), solved }) {
-        evaluation.disputes.remove(at);
-        ban_outvoted(turn, assignment.job, result);
+    match evaluation.disputes[at].ballot.cast(Vote { by: by.clone(), solved }) {
+        Cast::Counted => decide_dispute(turn, assignment.job, assignment.attempt, at),
+        Cast::Contradicts(found) => contradicts_itself(turn, assignment.job, by, *found),
     }
 }
 
-/// Bans the workers that were outvoted.
-fn ban_outvoted(turn: &mut Turn, job: JobId, result: VoteResult) {
-    let VoteResult { agreeing: [one, other], outvoted } = result;
-    for Contradiction { index, answers: [(_, right), (worker, wrong)] } in outvoted {
+/// Ends a dispute of an evaluation if one answer has the majority.
+fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
+    let of_attempt = |it: &&PendingEvaluation| it.attempt == attempt;
+    let found = turn.state.jobs.get(&job).and_then(|job| job.evaluations().find(of_attempt));
+    let Some(dispute) = found.and_then(|evaluation| evaluation.disputes.get(at)) else {
+        return;
+    };
+    let Some(verdict) = dispute.ballot.verdict(audits::voters(turn.state, dispute, Some(turn.now))) else {
+        return;
+    };
+    let Some(job_) = turn.state.jobs.get_mut(&job) else {
+        return;
+    };
+    let evaluation = job_.evaluations_mut().find(|it| it.attempt == attempt);
+    let needless = evaluation.map(|evaluation| evaluation.disputes.remove(at).tie_breakers);
+    for tie_breaker in needless.unwrap_or_default() {
+        batches::revoke(turn, tie_breaker);
+    }
+    ban_outvoted(turn, job, verdict);
+}
+
+/// Bans the hosts that were outvoted.
+fn ban_outvoted(turn: &mut Turn, job: JobId, verdict: Verdict) {
+    let Verdict { agreeing, outvoted } = verdict;
+    let (first, others) = agreeing.split_at(agreeing.len().min(HOSTS_SHOWN_MAX));
+    let further = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
+    for Contradiction { index, answers: [(_, right), (worker, wrong)], .. } in outvoted {
         let reason = format!(
-            "answered realization {index} of job {job} with {}, while {one} and {other} agree on \
-             {}",
+            "answered realization {index} of job {job} with {}, while {}{further} agree on {}",
             shown(wrong),
+            first.join(", "),
             shown(right)
         );
         bans::ban(turn, &worker, job, reason);
@@ -112,7 +219,16 @@ pub(crate) fn give_up(turn: &mut Turn) {
         return;
     }
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
+    for setup in proofs::tick(turn) {
+        decide_proofs(turn, &setup);
+    }
     for job in active {
+        // Hosts may have left whose votes a dispute waited for.
+        let disputed = turn.state.jobs.get(&job).and_then(Job::evaluation);
+        let disputed = disputed.map(|it| (it.attempt, it.disputes.len()));
+        for at in (0..disputed.map_or(0, |(_, count)| count)).rev() {
+            decide_dispute(turn, job, disputed.map_or(0, |(attempt, _)| attempt), at);
+        }
         for attempt in give_up_audits(turn.state, job) {
             jobs::settle(turn, job, attempt);
         }
@@ -132,7 +248,7 @@ fn give_up_audits(state: &mut State, id: JobId) -> Vec<u64> {
     let with = job.certain_mut().filter(|it| !it.audits.is_empty());
     let pending: Vec<_> = with.map(|it| (it.attempt, std::mem::take(&mut it.audits))).collect();
     for (attempt, mut audits) in pending {
-        audits.retain(|audit| state.answers_batches(|name| *name != audit.by));
+        audits.retain(|audit| state.can_check(audit.by.host()));
         let mut evaluations = state.jobs.get_mut(&id).into_iter().flat_map(Job::certain_mut);
         if let Some(evaluation) = evaluations.find(|it| it.attempt == attempt) {
             evaluation.audits = audits;
@@ -141,18 +257,27 @@ fn give_up_audits(state: &mut State, id: JobId) -> Vec<u64> {
     attempts
 }
 
-/// Returns the failure of a job with a dispute that cannot be decided, if there is one.
+/// Returns the failure of a job with a dispute that cannot be decided, or with workers whose proofs
+/// contradict each other, if there is one.
 fn undecided(state: &State, job: JobId, now: Duration) -> Option<RunFailure> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
+    let setup = state.jobs.get(&job)?.setup;
+    if let Some(proofs) = state.proofs.of(&setup)
+        && let Some(since) = proofs.undecided_since
+        && now.saturating_sub(since) > state.config.expiry
+    {
+        let contradiction = Box::new(proofs.ballot.contradiction()?);
+        return Some(RunFailure::Contradiction { contradiction, point: proofs.point() });
+    }
     let hopeless = |dispute: &&Dispute| {
         let patient = now.saturating_sub(dispute.since) <= state.config.expiry;
-        let nobody = !state.answers_batches(|name| !dispute.has_vote_of(name));
-        let others = |name: &WorkerName| !dispute.has_vote_of(name);
+        let others = |name: &WorkerName| !dispute.has_vote_of(name.host());
+        let nobody = !state.answers_batches(others);
         let lethal = poison::is_poison(state, &dispute.crashes, others, now);
         let waited_for = |tie_breaker| overdue::is_waited_for(state, tie_breaker, now);
         !dispute.tie_breakers.iter().copied().any(waited_for) && (lethal || (nobody && !patient))
     };
     let dispute = evaluation.disputes.iter().find(hopeless)?;
-    let contradiction = Box::new(dispute.contradiction()?);
+    let contradiction = Box::new(dispute.ballot.contradiction()?);
     Some(RunFailure::Contradiction { contradiction, point: evaluation.point })
 }

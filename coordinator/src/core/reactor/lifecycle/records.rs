@@ -198,8 +198,10 @@ pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
 
 /// Handles the report that the end of a job is durable.
 fn on_end_stored(turn: &mut Turn, id: JobId) {
-    let Some(Job { record, stage: Stage::StoringEnd(end), pending_replies, sequence, .. }) =
-        turn.state.jobs.remove(&id)
+    let Some(job) = turn.state.jobs.remove(&id) else {
+        return;
+    };
+    let Job { record, stage: Stage::StoringEnd(end), pending_replies, sequence, mut doubts, search, .. } = job
     else {
         return;
     };
@@ -211,7 +213,8 @@ fn on_end_stored(turn: &mut Turn, id: JobId) {
         evaluations: end.evaluations,
         elapsed: end.ended.saturating_sub(record.accepted),
     }));
-    turn.state.ended.insert(id, EndedJob::new(&record, end, sequence));
+    doubts.set_digest(search.summary().digest);
+    turn.state.ended.insert(id, EndedJob { doubts, ..EndedJob::new(&record, end, sequence) });
     turn.state.changed.remove(&id);
     let Some(snapshot) = snapshot::job_snapshot(turn.state, id, turn.now) else {
         return;

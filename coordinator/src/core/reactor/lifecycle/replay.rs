@@ -100,7 +100,9 @@ fn read_failed(turn: &mut Turn, id: JobId, error: String) {
 
 /// Passes a stored evaluation to the search, or has it computed again.
 fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
-    let doubtful = record.workers.iter().any(|worker| turn.state.ban(worker).is_some());
+    let known = turn.state.jobs.get(&id).map(|job| &job.record);
+    let is_doubtful = |job| record.workers.iter().any(|it| turn.state.is_doubtful(it, job));
+    let doubtful = known.is_some_and(is_doubtful);
     let attempt = turn.state.new_attempt();
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;

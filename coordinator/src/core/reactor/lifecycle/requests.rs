@@ -7,7 +7,7 @@ use osteon_common::job::{Data, Group, JobSpecification, VelocitySet};
 use osteon_common::limits::{JOBS_BYTES_CLIENT_DIVISOR, JOBS_MAX};
 use osteon_common::version;
 
-use super::{jobs, prune, workers};
+use super::{jobs, prune, recheck, workers};
 use crate::core::effect::{Answer, Effect, Record, Refusal};
 use crate::core::event::Request;
 use crate::core::explain;
@@ -17,7 +17,7 @@ use crate::core::job::{Job, RequestName, Stage, identity};
 use crate::core::job_pages;
 use crate::core::reactor::turn::Turn;
 use crate::core::snapshot;
-use crate::core::state::State;
+use crate::core::state::{Banned, State};
 use crate::core::worker_list;
 use crate::store::JobRecord;
 
@@ -49,6 +49,8 @@ pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, request: Request) {
         Request::Banned => Some(banned(turn.state, turn.now)),
         Request::Workers => Some(Answer::Workers(worker_list::all(turn.state, turn.now))),
         Request::DrainWorker(worker) => Some(drain(turn, worker)),
+        Request::Unban(host) => Some(unban(turn, &host)),
+        Request::Recheck(job) => recheck::requested(turn, reply_id, job),
         Request::Prune(retention) => {
             prune::requested(turn, reply_id, retention);
             None
@@ -193,11 +195,28 @@ fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
     }
 }
 
+/// Lifts the ban of a host.
+fn unban(turn: &mut Turn, host: &str) -> Answer {
+    let now = turn.now;
+    let is_of = |it: &&mut Banned| {
+        it.record.lifted.is_none() && it.record.worker.host() == host
+    };
+    let Some(banned) = turn.state.banned.iter_mut().find(is_of) else {
+        return Answer::Refused(Refusal::NotBanned { host: host.to_owned() });
+    };
+    banned.record.lifted = Some(now);
+    banned.refused = false;
+    banned.store_at = Some(now + turn.state.config.store_retry);
+    let record = banned.record.clone();
+    tracing::warn!(host, "the ban of this host is lifted");
+    turn.effects.push(Effect::Store(Record::Ban(record.clone())));
+    Answer::Unbanned(record)
+}
+
 fn banned(state: &State, now: Duration) -> Answer {
-    let newest = state.banned.len().saturating_sub(BANNED_SHOWN_MAX);
-    let shown = state
-        .banned
-        .iter()
+    let in_force = || state.banned.iter().filter(|banned| banned.record.lifted.is_none());
+    let newest = in_force().count().saturating_sub(BANNED_SHOWN_MAX);
+    let shown = in_force()
         .skip(newest)
         .map(|banned| (banned.record.clone(), now.saturating_sub(banned.record.at)));
     Answer::Banned(shown.collect())

@@ -8,13 +8,15 @@ use osteon_common::version;
 
 use super::jobs;
 use crate::config::Config;
+use crate::core::doubts::Doubts;
 use crate::core::effect::Effect;
 use crate::core::ids::JobId;
 use crate::core::job::{EndedJob, Job, RequestName, Stage, sequence};
 use crate::core::reactor::turn::Turn;
 use crate::core::saved::SavedParts;
 use crate::core::state::{Banned, State};
-use crate::store::{BanRecord, JobRecord, PartRecord, Store, StoreError};
+use crate::core::worker_name::WorkerName;
+use crate::store::{BanRecord, DoubtRecord, JobRecord, PartRecord, Store, StoreError};
 
 /// Contents of a store, without evaluations.
 #[derive(Debug, Default)]
@@ -25,6 +27,9 @@ pub struct Restored {
     /// Results of incomplete evaluations of these, by their jobs.
     parts: BTreeMap<JobId, Vec<PartRecord>>,
     banned: Vec<BanRecord>,
+    doubts: Vec<DoubtRecord>,
+    /// Digests of the results of the ended jobs among these.
+    digests: BTreeMap<JobId, String>,
     last_deleted_job: Option<JobId>,
 }
 
@@ -32,8 +37,8 @@ impl Restored {
     /// Reads a store. Blocks.
     ///
     /// An unfinished job whose evaluations were computed with other numerics than this program's
-    /// begins again: results of different numerics are never mixed. Workers stay banned while their
-    /// answers may be in the evaluations of an unfinished job.
+    /// begins again: results of different numerics are never mixed. Hosts stay banned until an operator lifts
+    /// the ban.
     ///
     /// # Errors
     /// When the store cannot be read or written, or an evaluation is missing in it.
@@ -48,10 +53,14 @@ impl Restored {
         for (record, evaluations) in &mut restored.unfinished {
             keep_numerics(store, record, evaluations)?;
         }
-        if restored.unfinished.is_empty() {
-            store.delete_bans()?;
-        }
         restored.banned = store.bans()?;
+        restored.doubts = store.doubts()?;
+        for doubt in &restored.doubts {
+            // A damaged summary is reported where the result is fetched.
+            if let Ok(Some(summary)) = store.summary(doubt.job) {
+                restored.digests.insert(doubt.job, summary.digest);
+            }
+        }
         restored.last_deleted_job = store.last_deleted_job()?;
         for (JobRecord { job, .. }, _) in &restored.unfinished {
             let parts = store.parts(*job)?;
@@ -105,13 +114,23 @@ impl State {
     /// Returns a coordinator that continues with `restored`, as of `now`, and its first effects.
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
         let mut state = Self::new(config, now);
-        let Restored { ended, unfinished, mut parts, banned, last_deleted_job } = restored;
+        let Restored { ended, unfinished, mut parts, banned, doubts, mut digests, last_deleted_job } =
+            restored;
+        let mut doubts_of: BTreeMap<JobId, Doubts> = BTreeMap::new();
+        for doubt in doubts {
+            let of = doubts_of.entry(doubt.job).or_default();
+            if let Some(digest) = digests.remove(&doubt.job) {
+                of.set_digest(digest);
+            }
+            of.add(doubt);
+        }
         state.next_job = last_deleted_job.map_or(1, |job| job.0 + 1);
         let durable = |record| Banned { record, store_at: None, refused: false };
         state.banned = banned.into_iter().map(durable).collect();
         for (id, mut job) in ended {
             // Snapshots were published while the end was on its way to the store.
             job.sequence = sequence(job.sequence, now);
+            job.doubts = doubts_of.remove(&id).unwrap_or_default();
             state.know(id, job.request.clone());
             state.ended.insert(id, job);
         }
@@ -120,8 +139,11 @@ impl State {
             state.know(id, RequestName::from_record(&record));
             state.waiting.push_back(id);
             let mut job = Job::new(record, Stage::Waiting, evaluations, now);
+            job.doubts = doubts_of.remove(&id).unwrap_or_default();
             let parts = parts.remove(&id).unwrap_or_default();
-            job.saved = SavedParts::new(parts, |worker| state.ban(worker).is_some());
+            let is_doubtful = |worker: &WorkerName| state.is_doubtful(worker, &job.record);
+            let saved = SavedParts::new(parts, is_doubtful);
+            job.saved = saved;
             state.jobs.insert(id, job);
         }
         let mut turn = Turn::new(&mut state, now);

@@ -1,6 +1,6 @@
 //! Attachment, heartbeats, draining and loss of workers.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
@@ -23,7 +23,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
         close(turn, worker, CloseReason::SecondHello);
         return;
     }
-    if let Err(reason) = admit(turn.state, &hello) {
+    if let Err(reason) = admit(turn.state, &hello, turn.now) {
         // A name that is too long is shortened before it is shown.
         let host: String = hello.host.chars().take(NAME_BYTES_MAX).collect();
         let name = WorkerName::new(&host, hello.process, hello.instance);
@@ -46,6 +46,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
         slots: hello.slots,
         version: hello.version.clone(),
     }));
+    *turn.state.hosts.entry(name.host().to_owned()).or_default() += 1;
     turn.state.workers.insert(
         worker,
         AttachedWorker {
@@ -59,6 +60,10 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
             missed: MissedBatches::default(),
             heartbeat_sent: turn.now,
             in_flight: Vec::new(),
+            proofs: Vec::new(),
+            proven: BTreeSet::new(),
+            early: Vec::new(),
+            until_audit: None,
             settled: VecDeque::new(),
             rate: Rate::default(),
             rates: BTreeMap::new(),
@@ -170,6 +175,9 @@ fn cause(why: &Departure) -> Cause {
         | CloseReason::WrongCount { .. }
         | CloseReason::SecondHello
         | CloseReason::FingerprintDiffers { .. }
+        | CloseReason::VersionDiffers { .. }
+        | CloseReason::AttachesTooOften { .. }
+        | CloseReason::ImpossibleVelocity { .. }
         | CloseReason::Slots { .. }
         | CloseReason::NameTooLong { .. }
         | CloseReason::TooManyWorkers { .. } => Cause::Misbehaviour,
@@ -188,12 +196,12 @@ pub(crate) fn drain_all(turn: &mut Turn) {
     }
 }
 
-fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
+fn admit(state: &mut State, hello: &Hello, now: Duration) -> Result<(), CloseReason> {
     let coordinator = version::fingerprint();
     let longest =
         [&hello.version, &hello.fingerprint, &hello.host].into_iter().map(String::len).max();
     let bytes = longest.unwrap_or(0);
-    let ban = state.ban(&name(hello));
+    let ban = state.ban(name(hello).host()).map(|ban| ban.reason.clone());
     if state.draining {
         Err(CloseReason::Draining)
     } else if bytes > NAME_BYTES_MAX {
@@ -201,12 +209,17 @@ fn admit(state: &State, hello: &Hello) -> Result<(), CloseReason> {
     } else if hello.fingerprint != coordinator {
         let worker = hello.fingerprint.clone();
         Err(CloseReason::FingerprintDiffers { worker, coordinator })
-    } else if let Some(ban) = ban {
-        Err(CloseReason::Banned { reason: ban.reason.clone() })
+    } else if hello.version != version::VERSION {
+        let (worker, coordinator) = (hello.version.clone(), version::VERSION);
+        Err(CloseReason::VersionDiffers { worker, coordinator })
+    } else if let Some(reason) = ban {
+        Err(CloseReason::Banned { host: hello.host.clone(), reason })
     } else if hello.slots == 0 || hello.slots > WORKER_THREADS_MAX {
         Err(CloseReason::Slots { slots: hello.slots, max: WORKER_THREADS_MAX })
     } else if state.workers.len() >= WORKERS_MAX {
         Err(CloseReason::TooManyWorkers { limit: WORKERS_MAX })
+    } else if state.attachments.exceed(&hello.host, now) {
+        Err(CloseReason::AttachesTooOften { host: hello.host.clone() })
     } else {
         Ok(())
     }

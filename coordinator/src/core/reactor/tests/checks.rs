@@ -76,19 +76,70 @@ fn one_worker_alone_is_believed() {
 }
 
 #[test]
-fn two_containers_may_have_host_and_process_in_common() {
-    let of_instance = |worker, instance| {
-        let Event::Hello { worker, mut hello } = hello_of(worker, 1, 1) else { panic!("no hello") };
-        hello.instance = instance;
-        Event::Hello { worker, hello }
-    };
-    let mut rig = rig(1, 0);
-    rig.event(of_instance(1, 5));
-    // The same process once more, and a process of another container.
-    rig.event(of_instance(2, 5));
-    rig.check(of_instance(3, 6), &["welcome 3, lease 3"]);
-    rig.check(answer(1, 1, 0, 1), &["send 3: batch 2 = 0+1"]);
-    rig.check(answer(3, 2, 0, 1), &["store job 1 evaluation 0"]);
+fn workers_of_one_host_do_not_check_each_other() {
+    let of_host = |worker, process| hello_on("node-1", worker, process, 1);
+    let mut rig = rig(1, 1);
+    for process in 2..=4 {
+        rig.event(of_host(process, process as u32));
+    }
+    rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
+    // A worker of another host does, and a third host decides, not a second process of one of the two.
+    let mut rig = self::rig(1, 1);
+    rig.event(of_host(2, 2));
+    rig.event(hello_on("node-9", 9, 9, 1));
+    rig.check(wrong(1, 1, 0, ONE_BIT), &["send 9: batch 2 = 0+1"]);
+    rig.check(answer(9, 2, 0, 1), &[]);
+    rig.check(hello_on("node-9", 10, 10, 1), &["welcome 10, lease 4"]);
+    let effects = rig.event(hello_on("node-5", 5, 5, 1));
+    assert_eq!(effects[1], "send 5: batch 3 = 0+1");
+    let effects = rig.event(answer(5, 3, 0, 1));
+    assert!(effects[0].starts_with("store ban 1: node-1 (process 1)"), "{effects:?}");
+    // Both processes of the banned host are sent away, and others are refused.
+    let closed = |worker: u64| effects.iter().any(|it| it.starts_with(&format!("close {worker}: host node-1")));
+    assert_eq!([1, 2, 5, 9].map(closed), [true, true, false, false], "{effects:?}");
+    let refused = rig.event(of_host(7, 7));
+    assert!(refused[0].starts_with("close 7: host node-1 is banned"), "{refused:?}");
+}
+
+#[test]
+fn a_ban_lasts_until_it_is_lifted() {
+    let mut rig = rig(1, 3);
+    rig.event(wrong(1, 1, 0, ONE_BIT));
+    rig.event(answer(2, 2, 0, 1));
+    rig.event(answer(3, 3, 0, 1));
+    rig.event(stored(1, RecordKey::Ban(1)));
+    let unban = |host: &str| request(8, Request::Unban(host.to_owned()));
+    let unknown = "answer 8: host `node-2` is not banned; `osteon workers` lists those that are";
+    rig.check(unban("node-2"), &[unknown]);
+    let effects = rig.event(unban("node-1"));
+    assert_eq!(effects.last().map(String::as_str), Some("answer 8: lifted node-1"));
+    assert!(effects[0].starts_with("store ban 1: node-1"), "{effects:?}");
+    rig.event(stored(1, RecordKey::Ban(1)));
+    rig.check(unban("node-1"), &["answer 8: host `node-1` is not banned; `osteon workers` lists those that are"]);
+    let effects = rig.event(hello_of(9, 1, 1));
+    assert_eq!(effects[0], "welcome 9, lease 4");
+    // Its answers in jobs that were accepted before remain doubtful.
+    let name = crate::core::worker_name::WorkerName::new("node-1", 1, 0);
+    assert!(rig.state.is_doubtful(&name, &rig.state.jobs[&JobId(1)].record));
+    rig.now += Duration::from_secs(1);
+    let later = rig.accept(propagation(1));
+    assert!(!rig.state.is_doubtful(&name, &rig.state.jobs[&later].record));
+}
+
+#[test]
+fn two_that_agree_are_no_majority_of_five() {
+    let mut rig = rig(1, 5);
+    // Hosts 1 and 3 are broken in the same way.
+    rig.check(wrong(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
+    // Two votes are lacking, of three hosts that can give them.
+    rig.check(answer(2, 2, 0, 1), &["send 3: batch 3 = 0+1", "send 4: batch 4 = 0+1"]);
+    rig.check(wrong(3, 3, 0, ONE_BIT), &[]);
+    rig.check(answer(4, 4, 0, 1), &["send 5: batch 5 = 0+1"]);
+    let effects = rig.event(answer(5, 5, 0, 1));
+    for (at, host) in ["node-1", "node-3"].into_iter().enumerate() {
+        let banned = format!("store ban {}: {host}", at + 1);
+        assert!(effects.iter().any(|effect| effect.starts_with(&banned)), "{host}: {effects:?}");
+    }
 }
 
 #[test]
@@ -122,14 +173,14 @@ fn a_third_worker_decides_against_the_first() {
     let effects = rig.event(answer(3, 3, 0, 1));
     // The wrong answer filled the result: the evaluation begins again.
     assert_eq!(effects.len(), 3, "{effects:?}");
-    let banned = format!("store ban 1: node (process 1) {JUDGED}");
+    let banned = format!("store ban 1: node-1 (process 1) {JUDGED}");
     assert!(effects[0].starts_with(&banned), "{effects:?}");
-    assert!(effects[1].starts_with("close 1: this worker is banned"), "{effects:?}");
+    assert!(effects[1].starts_with("close 1: host node-1 is banned"), "{effects:?}");
     assert_eq!(effects[2], "send 2: batch 4 = 0+1");
     // The worker stays banned, and its later answers are ignored.
     rig.check(answer(1, 1, 0, 1), &[]);
     let refused = rig.event(hello_of(9, 1, 1));
-    assert!(refused[0].starts_with("close 9: this worker is banned"), "{refused:?}");
+    assert!(refused[0].starts_with("close 9: host node-1 is banned"), "{refused:?}");
     rig.check(answer(2, 4, 0, 1), &["send 3: batch 5 = 0+1"]);
     rig.check(answer(3, 5, 0, 1), &["store job 1 evaluation 0"]);
 }
@@ -141,9 +192,9 @@ fn a_third_worker_decides_against_the_second() {
     rig.check(wrong(2, 2, 0, ONE_BIT), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
     assert_eq!(effects.len(), 3, "{effects:?}");
-    let banned = format!("store ban 1: node (process 2) {JUDGED}");
+    let banned = format!("store ban 1: node-2 (process 2) {JUDGED}");
     assert!(effects[0].starts_with(&banned), "{effects:?}");
-    assert!(effects[1].starts_with("close 2: this worker is banned"), "{effects:?}");
+    assert!(effects[1].starts_with("close 2: host node-2 is banned"), "{effects:?}");
     // Its answer filled no result: nothing is computed again.
     assert_eq!(effects[2], "store job 1 evaluation 0");
 }
@@ -155,7 +206,7 @@ fn an_estimated_error_is_an_answer_too() {
     let off = RealizationResult { outcome: Ok(0.0), estimated_error: 1e-9, decay: 0.0 };
     rig.check(wrong(2, 2, 0, off), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
-    assert!(effects[0].starts_with("store ban 1: node (process 2)"), "{effects:?}");
+    assert!(effects[0].starts_with("store ban 1: node-2 (process 2)"), "{effects:?}");
 }
 
 #[test]
@@ -180,7 +231,7 @@ fn of_two_workers_none_is_believed() {
     let reason = &effects[0];
     let expected = "store job 1 end: failed integrity error: realization 0 at the point";
     assert!(reason.starts_with(expected), "{reason}");
-    for part in ["by node (process 1) and 3900.0000000000005 m/s", "attach three workers"] {
+    for part in ["by node-1 (process 1) and 3900.0000000000005 m/s", "hosts node-1, node-2 give no majority"] {
         assert!(reason.contains(part), "{reason}");
     }
 }
@@ -194,7 +245,7 @@ fn a_third_worker_that_comes_in_time_decides() {
     rig.check(hello_of(3, 2, 1), &["welcome 3, lease 3"]);
     rig.check(hello_of(4, 4, 1), &["welcome 4, lease 4", "send 4: batch 3 = 0+1"]);
     let effects = rig.event(answer(4, 3, 0, 1));
-    let closed = effects.iter().filter(|effect| effect.contains("this worker is banned"));
+    let closed = effects.iter().filter(|effect| effect.contains("host node-2 is banned"));
     assert_eq!(closed.count(), 2, "{effects:?}");
 }
 
@@ -205,20 +256,32 @@ fn a_copy_that_answers_differently_is_judged() {
     // Worker 1 has both, the others get duplicates.
     let copies = ["send 2: batch 3 = 0+1", "send 3: batch 4 = 1+1"];
     rig.check_after(Duration::from_millis(100), &copies);
-    rig.check(wrong(2, 3, 0, ONE_BIT), &["revoke 1: batch 1"]);
+    // Nobody else has answered anything, so worker 2 gets the other one, too.
+    let effects = ["revoke 1: batch 1", "send 2: batch 5 = 1+1"];
+    rig.check(wrong(2, 3, 0, ONE_BIT), &effects);
     // The answer of worker 1 had been sent already.
-    rig.check(answer(1, 1, 0, 1), &["send 3: batch 5 = 0+1"]);
-    let effects = rig.event(answer(3, 5, 0, 1));
-    assert!(effects[0].starts_with("store ban 1: node (process 2)"), "{effects:?}");
+    rig.check(answer(1, 1, 0, 1), &["send 3: batch 6 = 0+1"]);
+    let effects = rig.event(answer(3, 6, 0, 1));
+    assert!(effects[0].starts_with("store ban 1: node-2 (process 2)"), "{effects:?}");
 }
 
 #[test]
 fn who_contradicts_itself_needs_no_judge() {
-    let mut rig = rig(8, 1);
-    rig.check(answer(1, 1, 0, 2), &["send 1: batch 3 = 4+1"]);
-    rig.check(answer(1, 1, 0, 2), &[]);
-    let effects = rig.event(answer(1, 1, 1, 2));
-    let banned = "store ban 1: node (process 1) answered realization 0 as 3900 m/s";
-    assert!(effects[0].starts_with(banned), "{effects:?}");
-    assert!(effects[3].starts_with("close 1: this worker is banned"), "{effects:?}");
+    // The host is banned; if it is the only one, the job fails.
+    for alone in [false, true] {
+        let mut rig = rig(8, 1);
+        rig.check(answer(1, 1, 0, 2), &["send 1: batch 3 = 4+1"]);
+        rig.check(answer(1, 1, 0, 2), &[]);
+        if !alone {
+            rig.event(hello_of(2, 2, 1));
+        }
+        let effects = rig.event(answer(1, 1, 1, 2));
+        let expected = match alone {
+            false => "store ban 1: node-1 (process 1) answered realization 0 as 3900 m/s",
+            true => "store job 1 end: failed integrity error: realization 0 at the point",
+        };
+        assert!(effects[0].starts_with(expected), "{effects:?}");
+        let closed = effects.iter().any(|it| it.starts_with("close 1: host node-1 is banned"));
+        assert_eq!(closed, !alone, "{effects:?}");
+    }
 }

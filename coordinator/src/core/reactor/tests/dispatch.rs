@@ -141,7 +141,7 @@ fn each_of_many_workers_is_tried_with_one_batch() {
 fn a_job_on_many_workers_begins_with_few_batches_of_unknown_duration() {
     let mut rig = Rig::new();
     for worker in 1..=600 {
-        rig.event(hello(worker, 2));
+        rig.event(hello_of(worker, worker as u32, 2));
     }
     let mut sends = |event| {
         let effects = rig.event(event);
@@ -170,7 +170,7 @@ fn a_job_on_many_workers_begins_with_few_batches_of_unknown_duration() {
 fn workers_do_not_wait_for_long_until_the_duration_of_a_batch_is_known() {
     let mut rig = Rig::new();
     for worker in 1..=600 {
-        rig.event(hello(worker, 2));
+        rig.event(hello_of(worker, worker as u32, 2));
     }
     let sends = |rig: &mut Rig, event| {
         rig.event(event).iter().filter(|effect| effect.starts_with("send ")).count()

@@ -53,7 +53,11 @@ fn expose(rig: &mut Rig, process: u32) -> Vec<String> {
     let job = JobId(rig.state.next_job - 1);
     let batch = batch_of(rig, job);
     rig.event(answer(50, batch, 0, 1));
-    rig.event(answer(50, batch, 1, 1))
+    // Were it the only host, the job would fail.
+    rig.event(hello_on("other", 61, 61, 1));
+    let effects = rig.event(answer(50, batch, 1, 1));
+    rig.event(end_of_stream(61));
+    effects
 }
 
 #[test]
@@ -198,7 +202,7 @@ fn a_job_that_is_cancelled_before_its_turn_leaves_what_is_stored() {
 fn the_evaluations_of_a_banned_worker_are_computed_again() {
     let (mut rig, store) = rig(&[1, 2], 3);
     let effects = expose(&mut rig, 2);
-    assert!(effects[0].starts_with("store ban 1: node (process 2)"), "{effects:?}");
+    assert!(effects[0].starts_with("store ban 1: node-2 (process 2)"), "{effects:?}");
     // Nothing is read before the ban is durable.
     assert!(!effects.iter().any(|effect| effect.starts_with("read")), "{effects:?}");
     rig.check_after(Duration::from_secs(2), &[]);
@@ -214,7 +218,7 @@ fn the_evaluations_of_a_banned_worker_are_computed_again() {
     let Effect::Store(Record::Evaluation { record, is_last: false }) = &effects[0] else {
         panic!("{effects:?}");
     };
-    let name = WorkerName::new("node", 3, 0);
+    let name = WorkerName::new("node-3", 3, 0);
     assert_eq!(record.workers, BTreeSet::from([name]));
     rig.check(stored(1, RecordKey::Evaluation(1)), &["read job 1 evaluation 2"]);
     read(&mut rig, &store, 2);

@@ -69,7 +69,7 @@ fn a_job_is_counted_from_its_acceptance_to_its_end() {
     assert_eq!((counts.jobs_accepted, counts.evaluations), (1, 1));
     assert_eq!((counts.evaluation_times.count(), counts.evaluation_times.sum_s()), (1, 2.0));
     assert_eq!(counts.jobs_ended.iter().sum::<u64>(), 1);
-    assert_eq!(counts.batches_sent, [1, 0, 0, 0, 0]);
+    assert_eq!(counts.batches_sent, [1, 0, 0, 0, 0, 0]);
     let measured = counted.measured();
     let expected =
         StateMeasurements { jobs_ended: 1, slots_idle: 2, workers_ok: 1, ..measured.clone() };
@@ -107,7 +107,7 @@ fn duplicates_are_counted() {
     counted.rig.now += Duration::from_millis(150);
     counted.event(Event::Tick);
     assert_eq!(counted.counts().batches_duplicated, 1);
-    assert_eq!(counted.counts().batches_sent, [1, 0, 0, 0, 0]);
+    assert_eq!(counted.counts().batches_sent, [1, 0, 0, 0, 0, 0]);
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn answers_that_differ_and_bans_are_counted() {
     counted.event(answer(3, 3, 0, 1));
     assert_eq!((counted.counts().mismatches, counted.counts().bans), (1, 1));
     assert_eq!(counted.measured().workers_banned, 1);
-    assert_eq!(counted.counts().batches_sent, [0, 0, 0, 1, 1]);
+    assert_eq!(counted.counts().batches_sent, [0, 0, 0, 1, 1, 0]);
 }
 
 #[test]

@@ -241,6 +241,7 @@ fn check_commands(commands: Vec<StoreCommand>, expected: usize, marks: u64) {
             StoreCommand::Put(record) => Some(record.key()),
             StoreCommand::Read { job, number } => Some((*job, RecordKey::Evaluation(*number))),
             StoreCommand::Prune { jobs, .. } => Some((jobs[0], RecordKey::End)),
+            StoreCommand::Reopen { job, .. } => Some((*job, RecordKey::Job)),
             StoreCommand::Fetch(_) | StoreCommand::Copy { .. } => None,
         });
         assert!(sender.try_send(command).is_ok());

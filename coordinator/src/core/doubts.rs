@@ -1,0 +1,85 @@
+//! Doubts about results: a host that computed a part of an ended job was banned later. Such a job can be
+//! computed again without the answers of that host.
+
+use std::time::Duration;
+
+use osteon_common::results::Integrity;
+
+use crate::core::ids::JobId;
+use crate::core::job::sequence;
+use crate::core::state::State;
+use crate::store::DoubtRecord;
+
+/// The doubts about a job.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Doubts {
+    /// Numbers of the bans, with the digest of the result before it was computed again, if it was.
+    bans: Vec<(u64, Option<String>)>,
+    /// Digest of the result.
+    digest: Option<String>,
+}
+
+impl Doubts {
+    /// Adds what is stored of a doubt.
+    pub(crate) fn add(&mut self, record: DoubtRecord) {
+        self.bans.retain(|(ban, _)| *ban != record.ban);
+        self.bans.push((record.ban, record.digest));
+    }
+
+    /// Returns whether there are none.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.bans.is_empty()
+    }
+
+    /// Returns whether the job has not been computed again since a ban.
+    pub(crate) fn is_open(&self) -> bool {
+        self.bans.iter().any(|(_, before)| before.is_none())
+    }
+
+    /// Notes the digest of the result that the job has.
+    pub(crate) fn set_digest(&mut self, digest: String) {
+        self.digest = Some(digest);
+    }
+
+    /// Notes that the job is computed again: the digest of its result is that before.
+    pub(crate) fn reopen(&mut self) {
+        let before = self.digest.take().unwrap_or_default();
+        for (_, digest) in self.bans.iter_mut().filter(|(_, digest)| digest.is_none()) {
+            *digest = Some(before.clone());
+        }
+    }
+
+    /// Describes it in a sentence; empty if there is no doubt.
+    pub(crate) fn statement(&self, state: &State) -> String {
+        let digest = self.digest.as_deref().unwrap_or_default();
+        self.integrity(state).map_or_else(String::new, |it| it.statement(digest))
+    }
+
+    /// Returns what a result says about it.
+    pub(crate) fn integrity(&self, state: &State) -> Option<Integrity> {
+        let of = |ban: &u64| {
+            let found = state.banned.iter().find(|it| it.record.number == *ban)?;
+            Some(found.record.worker.host().to_owned())
+        };
+        let (open, settled): (Vec<_>, Vec<_>) =
+            self.bans.iter().partition(|(_, before)| before.is_none());
+        let concerned = if open.is_empty() { settled } else { open };
+        let mut banned_hosts: Vec<String> = concerned.iter().filter_map(|(ban, _)| of(ban)).collect();
+        banned_hosts.sort_unstable();
+        banned_hosts.dedup();
+        let (_, earlier_digest) = concerned.last()?;
+        Some(Integrity { banned_hosts, earlier_digest: (*earlier_digest).clone() })
+    }
+}
+
+/// Notes that ended jobs are doubtful because of a ban.
+pub(crate) fn note(state: &mut State, ban: u64, jobs: Vec<JobId>, now: Duration) {
+    for job in jobs {
+        if let Some(ended) = state.ended.get_mut(&job) {
+            ended.doubts.add(DoubtRecord { job, ban, digest: None });
+            ended.sequence = sequence(ended.sequence, now);
+            tracing::error!(%job, ban, "a host that computed a part of this ended job was banned; compute the \
+                job again with `osteon recheck`");
+        }
+    }
+}

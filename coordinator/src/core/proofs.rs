@@ -1,0 +1,184 @@
+//! Proofs: before the answers of a worker count, it computes a few realizations of the same setup that
+//! other hosts compute, too, and its answer must be that of the majority.
+//!
+//! Every stay of a worker gives such a proof, since the machine may have changed, for each setup, since
+//! a defect may show with one and not with another. The proofs of all hosts are votes of one ballot, so
+//! that it is known at once who is right. They are kept while the coordinator runs, also those of hosts
+//! that have left.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use osteon_common::job::JobSpecification;
+use osteon_common::limits::WORKERS_MAX;
+use osteon_common::parameters::Point;
+use osteon_proto::evaluation::{self, EvaluationInput};
+use prost::Message as _;
+
+use crate::core::ballot::Ballot;
+use crate::core::ids::{BatchId, WorkerId};
+use crate::core::indices::Indices;
+use crate::core::worker_name::WorkerName;
+
+/// Number of realizations of a proof: so few that short jobs can pay for them, so many that a defect
+/// that shows in one of two realizations is seen nearly always.
+const REALIZATIONS: u64 = 4;
+/// Number of setups whose proofs are remembered.
+const SETUPS_MAX: usize = 64;
+/// Number of workers of which it is remembered that they gave a proof.
+const GIVEN_MAX: usize = 4 * WORKERS_MAX;
+
+/// Digest of what a solver is set up for: layers, probe, picking, solver settings, random quantities
+/// and what is asked for. Different setups have different keys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SetupKey([u8; 32]);
+
+impl SetupKey {
+    /// Returns the key of a job's setup.
+    pub(crate) fn of(specification: &JobSpecification) -> Self {
+        let setup = EvaluationInput {
+            id: 0,
+            setup: specification.setup,
+            point: specification.start(),
+            germs: specification.monte_carlo.germs(),
+            random: specification.random,
+            with_decays: specification.has_decays(),
+        };
+        let mut message = evaluation::to_message(&setup);
+        (message.point, message.seed, message.sampling) = (None, 0, 0);
+        message.points_per_scramble = None;
+        Self(*blake3::hash(&message.encode_to_vec()).as_bytes())
+    }
+}
+
+/// The proofs of one setup.
+#[derive(Debug)]
+pub(crate) struct SetupProofs {
+    /// What is computed. Its number is that of no evaluation.
+    input: Arc<EvaluationInput>,
+    /// The votes of the hosts.
+    pub(crate) ballot: Ballot,
+    /// The batches that are out.
+    pub(crate) out: BTreeMap<WorkerId, BatchId>,
+    /// The workers that have given theirs, in this stay or an earlier one.
+    given: BTreeSet<WorkerName>,
+    /// Time since which all have voted that can, without a majority.
+    pub(crate) undecided_since: Option<Duration>,
+    /// Time of their last use.
+    used: Duration,
+}
+
+impl SetupProofs {
+    /// The realizations of a proof.
+    pub(crate) fn indices(&self) -> Indices {
+        self.ballot.indices()
+    }
+
+    /// The point of the realizations.
+    pub(crate) fn point(&self) -> Point {
+        self.input.point
+    }
+
+    /// Number by which batches refer to what is computed.
+    pub(crate) fn attempt(&self) -> u64 {
+        self.input.id
+    }
+
+    /// Records that a worker has given its proof.
+    pub(crate) fn give(&mut self, name: &WorkerName) {
+        if self.given.len() >= GIVEN_MAX {
+            self.given.pop_first();
+        }
+        self.given.insert(name.clone());
+    }
+
+    /// Returns whether a worker has given its proof, in any of its stays.
+    pub(crate) fn is_given_by(&self, name: &WorkerName) -> bool {
+        self.given.contains(name)
+    }
+
+    /// Removes what a banned host has given.
+    fn withdraw(&mut self, host: &str) {
+        self.ballot.withdraw(host);
+        self.given.retain(|name| name.host() != host);
+        self.undecided_since = None;
+    }
+}
+
+/// The proofs of all setups.
+#[derive(Debug, Default)]
+pub(crate) struct Proofs(BTreeMap<SetupKey, SetupProofs>);
+
+impl Proofs {
+    /// Returns the proofs of a setup.
+    pub(crate) fn of(&self, setup: &SetupKey) -> Option<&SetupProofs> {
+        self.0.get(setup)
+    }
+
+    /// As [`Proofs::of`].
+    pub(crate) fn of_mut(&mut self, setup: &SetupKey) -> Option<&mut SetupProofs> {
+        self.0.get_mut(setup)
+    }
+
+    /// Returns the setup and its proofs that a batch with this number is for.
+    pub(crate) fn with_attempt(&self, attempt: u64) -> Option<(SetupKey, &SetupProofs)> {
+        let found = self.0.iter().find(|(_, proofs)| proofs.attempt() == attempt);
+        found.map(|(setup, proofs)| (*setup, proofs))
+    }
+
+    /// Returns what batches with this number compute.
+    pub(crate) fn input(&self, attempt: u64) -> Option<Arc<EvaluationInput>> {
+        self.with_attempt(attempt).map(|(_, proofs)| Arc::clone(&proofs.input))
+    }
+
+    /// Begins the proofs of a setup by realizations of `input`, of which there are so many.
+    pub(crate) fn begin(
+        &mut self,
+        setup: SetupKey,
+        (input, realizations): (EvaluationInput, u64),
+        now: Duration,
+    ) {
+        if self.0.len() >= SETUPS_MAX {
+            // Those of setups in use are used all the time.
+            let unused = self.0.iter().filter(|(_, proofs)| proofs.out.is_empty());
+            if let Some(oldest) = unused.min_by_key(|(_, it)| it.used).map(|(setup, _)| *setup) {
+                self.0.remove(&oldest);
+            }
+        }
+        let indices = Indices { first: 0, count: realizations.clamp(1, REALIZATIONS) };
+        let proofs = SetupProofs {
+            input: Arc::new(input),
+            ballot: Ballot::new(indices),
+            out: BTreeMap::new(),
+            given: BTreeSet::new(),
+            undecided_since: None,
+            used: now,
+        };
+        self.0.insert(setup, proofs);
+    }
+
+    /// Notes that a setup is in use.
+    pub(crate) fn touch(&mut self, setup: &SetupKey, now: Duration) {
+        if let Some(proofs) = self.0.get_mut(setup) {
+            proofs.used = now;
+        }
+    }
+
+    /// Removes the batch of a worker, which is answered or revoked.
+    pub(crate) fn settle(&mut self, attempt: u64, worker: WorkerId) {
+        if let Some(proofs) = self.0.values_mut().find(|proofs| proofs.attempt() == attempt) {
+            proofs.out.remove(&worker);
+        }
+    }
+
+    /// Removes what a banned host has given.
+    pub(crate) fn withdraw(&mut self, host: &str) {
+        self.0.values_mut().for_each(|proofs| proofs.withdraw(host));
+    }
+
+    /// Returns the setups whose proofs are known.
+    pub(crate) fn setups(&self) -> impl Iterator<Item = &SetupKey> {
+        self.0.keys()
+    }
+}

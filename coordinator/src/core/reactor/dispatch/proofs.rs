@@ -1,0 +1,284 @@
+//! Asks workers for their proofs, and decides whether the results of an evaluation may count.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use super::{batches, overdue};
+use crate::core::audit;
+use crate::core::ballot::VOTERS_MAX;
+use crate::core::batch::{Assignment, Batch, Purpose};
+use crate::core::effect::Effect;
+use crate::core::evaluation::{Audit, PendingEvaluation};
+use crate::core::ids::{BatchId, JobId, WorkerId};
+use crate::core::job::Job;
+use crate::core::proofs::SetupKey;
+use crate::core::reactor::turn::Turn;
+use crate::core::state::{AttachedWorker, State};
+use crate::core::worker_name::WorkerName;
+
+/// Asks a worker that is about to get a batch of a job for its proof of the setup, if there is another
+/// host to compare it with. The first time, further hosts are asked, too, for a majority.
+pub(crate) fn ask_before(turn: &mut Turn, worker: WorkerId, job: JobId) {
+    let known = turn.state.jobs.get(&job).filter(|_| turn.state.config.proofs);
+    let Some(setup) = known.map(|job| job.setup) else {
+        return;
+    };
+    let is_proven = |attached: &AttachedWorker| attached.proven.contains(&setup);
+    if turn.state.workers.get(&worker).is_none_or(is_proven) {
+        return;
+    }
+    if turn.state.proofs.of(&setup).is_none() {
+        if !turn.state.several_hosts() || !begin(turn, job, setup) {
+            return;
+        }
+        ask(turn, worker, job);
+        ask_further(turn, job, VOTERS_MAX);
+    } else {
+        ask(turn, worker, job);
+    }
+}
+
+/// Begins the proofs of a setup with realizations of the first point of a job that is known.
+fn begin(turn: &mut Turn, id: JobId, setup: SetupKey) -> bool {
+    let attempt = turn.state.new_attempt();
+    let known = turn.state.jobs.get(&id).and_then(|job| {
+        let evaluation = job.evaluations().next()?;
+        Some((evaluation.point, evaluation.realizations()))
+    });
+    let Some((point, realizations)) = known else {
+        return false;
+    };
+    let Some(input) = turn.state.input(id, attempt, point) else {
+        return false;
+    };
+    turn.state.proofs.begin(setup, (input, realizations), turn.now);
+    true
+}
+
+/// Asks hosts that have not voted, until so many have, or are asked. Returns whether any is asked.
+pub(crate) fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) -> bool {
+    let Some(setup) = turn.state.jobs.get(&job).map(|job| job.setup) else {
+        return false;
+    };
+    let Some(proofs) = turn.state.proofs.of(&setup) else {
+        return false;
+    };
+    let state = &*turn.state;
+    let asked = proofs.out.keys().filter_map(|id| Some(state.workers.get(id)?.name.host()));
+    let mut hosts: BTreeSet<&str> = proofs.ballot.hosts().chain(asked).collect();
+    let mut chosen = Vec::new();
+    for (id, worker) in &state.workers {
+        if hosts.len() >= hosts_max {
+            break;
+        }
+        if state.is_sound(worker) && hosts.insert(worker.name.host()) {
+            chosen.push(*id);
+        }
+    }
+    let any = !chosen.is_empty();
+    chosen.into_iter().for_each(|worker| ask(turn, worker, job));
+    any
+}
+
+/// Sends a worker the batch by which it proves itself, unless it has it.
+fn ask(turn: &mut Turn, worker: WorkerId, job: JobId) {
+    let Some(setup) = turn.state.jobs.get(&job).map(|job| job.setup) else {
+        return;
+    };
+    turn.state.proofs.touch(&setup, turn.now);
+    let Some(proofs) = turn.state.proofs.of(&setup) else {
+        return;
+    };
+    if proofs.out.contains_key(&worker) {
+        return;
+    }
+    let (attempt, indices) = (proofs.attempt(), proofs.indices());
+    let assignment = Assignment { job, attempt, indices };
+    let Some(work) = turn.state.work(&assignment) else {
+        return;
+    };
+    let batch = BatchId(turn.state.next_batch);
+    turn.state.next_batch += 1;
+    turn.state.batches.insert(batch, Batch::new(assignment, Purpose::Proof, worker, turn.now));
+    if let Some(attached) = turn.state.workers.get_mut(&worker) {
+        attached.proofs.push(batch);
+    }
+    if let Some(proofs) = turn.state.proofs.of_mut(&setup) {
+        proofs.out.insert(worker, batch);
+    }
+    turn.effects.push(Effect::Send { worker, batch, work });
+}
+
+/// Returns the number of hosts whose votes on a setup count: those that have voted, and those whose
+/// answers are on their way.
+pub(crate) fn voters(state: &State, setup: &SetupKey, now: Duration) -> usize {
+    let Some(proofs) = state.proofs.of(setup) else {
+        return 0;
+    };
+    if proofs.out.is_empty() {
+        return proofs.ballot.count();
+    }
+    let awaited = proofs.out.iter().filter(|(_, batch)| !overdue::is_overdue(state, **batch, now));
+    let awaited = awaited.filter_map(|(id, _)| Some(state.workers.get(id)?.name.host()));
+    awaited.chain(proofs.ballot.hosts()).collect::<BTreeSet<_>>().len()
+}
+
+/// What the results of a worker need before they count.
+enum Need {
+    Nothing,
+    /// Its proof, or the votes of others.
+    Votes,
+    /// The worker has to be asked for its proof.
+    Proof(WorkerId),
+    /// It cannot give its proof any more.
+    Audit,
+}
+
+/// Decides whether the results of a complete evaluation may count, and asks for what is missing.
+pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
+    let found = turn.state.jobs.get(&id).and_then(|job| Some((job, of_attempt(job, attempt)?)));
+    let Some((job, evaluation)) = found else {
+        return;
+    };
+    if evaluation.is_cleared || evaluation.filled() < evaluation.realizations() {
+        return;
+    }
+    let setup = job.setup;
+    let state = &*turn.state;
+    let voters = voters(state, &setup, turn.now);
+    let names = evaluation.workers.iter().enumerate();
+    let needs: Vec<(usize, Need)> =
+        names.map(|(place, name)| (place, need(state, (evaluation, place), name, (&setup, voters), turn.now))).collect();
+    let mut is_cleared = true;
+    let mut audited = Vec::new();
+    for (place, need) in needs {
+        is_cleared &= matches!(need, Need::Nothing | Need::Audit);
+        match need {
+            Need::Nothing | Need::Votes => {}
+            Need::Proof(worker) => ask(turn, worker, id),
+            Need::Audit => audited.push(place),
+        }
+    }
+    let fraction = turn.state.config.audit_fraction;
+    let key = turn.state.config.audit_key;
+    let Some(evaluation) = turn.state.jobs.get_mut(&id).and_then(|job| of_attempt_mut(job, attempt)) else {
+        return;
+    };
+    for place in audited {
+        audit_last(evaluation, place, None);
+    }
+    if !is_cleared {
+        return;
+    }
+    evaluation.is_cleared = true;
+    let affordable = fraction * evaluation.realizations() as f64;
+    if evaluation.workers.len() as f64 <= affordable {
+        (0..evaluation.workers.len()).for_each(|place| audit_last(evaluation, place, Some(&key)));
+    }
+    let audits = std::mem::take(&mut evaluation.audits);
+    let checked: Vec<Audit> =
+        audits.into_iter().filter(|audit| turn.state.can_check(audit.by.host())).collect();
+    if let Some(evaluation) = turn.state.jobs.get_mut(&id).and_then(|job| of_attempt_mut(job, attempt)) {
+        evaluation.audits = checked.into();
+    }
+}
+
+fn of_attempt(job: &Job, attempt: u64) -> Option<&PendingEvaluation> {
+    job.certain().find(|evaluation| evaluation.attempt == attempt)
+}
+
+fn of_attempt_mut(job: &mut Job, attempt: u64) -> Option<&mut PendingEvaluation> {
+    job.certain_mut().find(|evaluation| evaluation.attempt == attempt)
+}
+
+/// Returns what the results of the worker at a place of an evaluation need.
+fn need(
+    state: &State,
+    (evaluation, place): (&PendingEvaluation, usize),
+    name: &WorkerName,
+    (setup, voters): (&SetupKey, usize),
+    now: Duration,
+) -> Need {
+    let Some(proofs) = state.proofs.of(setup) else {
+        // As long as all workers are of one host, nothing can be compared.
+        return Need::Nothing;
+    };
+    if proofs.is_given_by(name) {
+        return match proofs.ballot.confirms(name.host(), voters) {
+            true => Need::Nothing,
+            false => Need::Votes,
+        };
+    }
+    let attached = state.workers.iter().find(|(_, worker)| worker.name == *name);
+    let is_late = |batch: &BatchId| overdue::is_overdue(state, *batch, now);
+    match attached.map(|(id, _)| (*id, proofs.out.get(id))) {
+        Some((id, None)) => Need::Proof(id),
+        Some((_, Some(batch))) if !is_late(batch) => Need::Votes,
+        _ if evaluation.vouched.contains(&place) || !state.can_check(name.host()) => Need::Nothing,
+        _ => Need::Audit,
+    }
+}
+
+/// Queues an audit of the last answer of a worker, unless it has been audited; with a key, of one
+/// realization of it.
+fn audit_last(evaluation: &mut PendingEvaluation, place: usize, one: Option<&audit::AuditKey>) {
+    if !evaluation.vouched.insert(place) {
+        return;
+    }
+    let (Some(last), Some(by)) = (evaluation.last_answers.get(place), evaluation.workers.get(place)) else {
+        return;
+    };
+    let indices = one.map_or(*last, |key| audit::choose_one(key, evaluation.attempt, *last));
+    evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
+}
+
+/// Gives up workers that do not answer, and asks further hosts where no answer has a majority. Returns
+/// the setups of which something may have been decided.
+pub(crate) fn tick(turn: &mut Turn) -> Vec<SetupKey> {
+    let mut changed = Vec::new();
+    let setups: Vec<SetupKey> = turn.state.proofs.setups().copied().collect();
+    for setup in setups {
+        let Some(proofs) = turn.state.proofs.of(&setup) else {
+            continue;
+        };
+        let late = |(_, batch): &(&WorkerId, &BatchId)| overdue::is_overdue(turn.state, **batch, turn.now);
+        let late: Vec<(WorkerId, BatchId)> =
+            proofs.out.iter().filter(late).map(|(worker, batch)| (*worker, *batch)).collect();
+        for (worker, batch) in &late {
+            if let Some(name) = turn.state.workers.get(worker).map(|worker| worker.name.clone()) {
+                overdue::begin_probation(turn.state, &name, turn.now, turn.now);
+            }
+            batches::revoke(turn, *batch);
+        }
+        let is_undecided = ask_for_majority(turn, &setup);
+        if !late.is_empty() || is_undecided {
+            changed.push(setup);
+        }
+    }
+    changed
+}
+
+/// Asks further hosts where those asked have no majority. Notes since when there are none to be asked.
+fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) -> bool {
+    let Some(proofs) = turn.state.proofs.of(setup) else {
+        return false;
+    };
+    let voters = voters(turn.state, setup, turn.now);
+    let voted = proofs.ballot.count();
+    if voted < 2 || voters > voted || proofs.ballot.lacks(voters) == 0 {
+        return false;
+    }
+    let more = voted + proofs.ballot.lacks(voters);
+    let job = turn.state.active.iter().find(|id| {
+        turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup)
+    });
+    let Some(job) = job.copied() else {
+        return false;
+    };
+    let is_asked = ask_further(turn, job, more);
+    let now = turn.now;
+    if let Some(proofs) = turn.state.proofs.of_mut(setup) {
+        proofs.undecided_since = if is_asked { None } else { proofs.undecided_since.or(Some(now)) };
+    }
+    true
+}
