@@ -72,12 +72,14 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
             assert!(count > SCHEDULES / 20, "{name}: {count}");
         }
         let world::Counts { exposed, replaced, confirmed, remembered, repaired, .. } = seen;
+        let rechecked = seen.rechecked;
         for (name, count) in [
             ("jobs failed over contradicting answers", exposed),
             ("stored evaluations replaced by others", replaced),
             ("stored evaluations computed again and the same", confirmed),
             ("restarts with banned workers", remembered),
             ("jobs that ended right although somebody lied", repaired),
+            ("ended jobs computed again after a ban", rechecked),
         ] {
             assert!(count > SCHEDULES / 200, "{name}: {count}");
         }

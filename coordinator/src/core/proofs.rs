@@ -63,7 +63,7 @@ pub(crate) struct SetupProofs {
     pub(crate) out: BTreeMap<WorkerId, BatchId>,
     /// The workers that have given theirs, in this stay or an earlier one.
     given: BTreeSet<WorkerName>,
-    /// Time since which all have voted that can, without a majority.
+    /// Time since which hosts have voted differently, and no answer has a majority.
     pub(crate) undecided_since: Option<Duration>,
     /// Time of their last use.
     used: Duration,

@@ -88,7 +88,7 @@ pub(crate) fn attached(process: u32) -> Event {
     Event::Hello { worker: WorkerId(process.into()), hello: hello(process) }
 }
 
-/// Returns the introduction of a worker with one thread.
+/// Returns the introduction of a worker with one thread, on a host of its own.
 pub(crate) fn hello(process: u32) -> Hello {
     let WorkerHello { version, fingerprint, slots, host, process, instance } = wire_hello(process);
     Hello { version, fingerprint, slots, host, process, instance }
@@ -100,7 +100,7 @@ pub(crate) fn wire_hello(process: u32) -> WorkerHello {
         version: VERSION.to_owned(),
         fingerprint: version::fingerprint(),
         slots: 1,
-        host: "node".to_owned(),
+        host: format!("node-{process}"),
         process,
         instance: mix(process.into()),
     }

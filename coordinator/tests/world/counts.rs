@@ -23,8 +23,10 @@ pub(crate) struct Counts {
     pub(crate) checked: u64,
     /// Wrong answers.
     pub(crate) lies: u64,
-    /// Workers banned.
+    /// Hosts banned.
     pub(crate) banned: u64,
+    /// Ended jobs that were computed again because of a ban.
+    pub(crate) rechecked: u64,
     /// Stored evaluations that were replaced by others.
     pub(crate) replaced: u64,
     /// Stored evaluations that were computed again and found the same.
@@ -70,6 +72,7 @@ impl Counts {
         self.checked += other.checked;
         self.lies += other.lies;
         self.banned += other.banned;
+        self.rechecked += other.rechecked;
         self.replaced += other.replaced;
         self.confirmed += other.confirmed;
         self.remembered += other.remembered;

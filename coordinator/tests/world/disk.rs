@@ -3,7 +3,7 @@
 use osteon_coordinator::core::effect::Record;
 use osteon_coordinator::core::event::{Event, ReadFailure, Request, Retention};
 use osteon_coordinator::core::ids::{JobId, ReplyId};
-use osteon_coordinator::store::{EvaluationRecord, Store as _};
+use osteon_coordinator::store::{BanRecord, EvaluationRecord, Store as _};
 
 use super::{Occurrence, World};
 use crate::fake;
@@ -13,10 +13,10 @@ impl World {
     pub(super) fn look_at(&mut self, record: &Record) {
         match record {
             Record::Ban(record) => {
-                let process = record.worker.process();
-                let lied = self.lies.iter().any(|(liar, _)| *liar == process);
+                let host = self.host_of(record.worker.process());
+                let lied = self.lies.iter().any(|(liar, _)| *liar == host);
                 assert!(lied, "{record:?}: it never lied");
-                self.counts.banned += u64::from(self.banned.insert(process));
+                self.counts.banned += u64::from(self.banned.insert(host));
             }
             Record::End { end, .. } => {
                 // The decision was checked when it was written first.
@@ -64,7 +64,14 @@ impl World {
             let (job, key) = record.key();
             Event::StoreFailed { job, key, error: "the disk is full".to_owned() }
         } else {
-            self.written(record)
+            let event = self.written(record);
+            if let Record::Ban(BanRecord { number, .. }) = record {
+                let doubts = self.store.doubts().unwrap();
+                let of_ban = doubts.into_iter().filter(|doubt| doubt.ban == *number);
+                let jobs = of_ban.map(|doubt| doubt.job).collect();
+                self.react(Event::Doubted { ban: *number, jobs });
+            }
+            event
         };
         self.within(5, Occurrence::Report(event));
     }
@@ -83,6 +90,31 @@ impl World {
             Record::Piece { .. } | Record::End { .. } | Record::Ban(_) => {}
         }
         fake::written(&mut self.store, record)
+    }
+
+    /// Requests now and then that ended jobs are computed again that a banned host contributed to.
+    pub(super) fn recheck(&mut self) {
+        if self.draw(10) > 0 {
+            return;
+        }
+        let doubts = self.store.doubts().unwrap();
+        let open = doubts.into_iter().filter(|doubt| doubt.digest.is_none());
+        for job in open.map(|doubt| doubt.job).collect::<Vec<_>>() {
+            let reply_id = ReplyId(self.number());
+            self.react(Event::Requested { reply_id, request: Request::Recheck(job) });
+        }
+    }
+
+    /// Makes an ended job an unfinished one, or fails to.
+    pub(super) fn reopen(&mut self, reply_id: ReplyId, job: JobId) {
+        let outcome = if self.refuses() {
+            Err("the disk is full".to_owned())
+        } else {
+            self.counts.rechecked += 1;
+            self.ends.remove(&job);
+            Ok(self.store.reopen_job(job).unwrap())
+        };
+        self.within(5, Occurrence::Report(Event::Reopened { reply_id, job, outcome }));
     }
 
     fn note_durable(&mut self, record: &EvaluationRecord, is_last: bool) {

@@ -9,9 +9,9 @@ use super::{HOUR, Occurrence, Worker, World};
 use crate::fake;
 
 /// Process numbers of the bad node are above this one.
-const BAD_PROCESSES: u32 = 1_000_000;
+pub(super) const BAD_PROCESSES: u32 = 1_000_000;
 /// Process numbers of workers that do not answer are above this one.
-const SILENT_PROCESSES: u32 = 2_000_000;
+pub(super) const SILENT_PROCESSES: u32 = 2_000_000;
 
 impl World {
     /// Decides whether there is a bad node, and when the coordinator is stopped or pauses.
@@ -51,7 +51,7 @@ impl World {
             known.heard = until;
             if !known.bad
                 && known.ignores_every == 0
-                && !self.banned.contains(&process)
+                && !self.banned.contains(&self.host_of(process))
                 && self.draw(2) == 0
             {
                 self.after(1, Occurrence::GiveUp(worker));

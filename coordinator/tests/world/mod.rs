@@ -73,6 +73,8 @@ enum Occurrence {
     Read(JobId, u64),
     /// Ended jobs are deleted.
     Forget(Option<ReplyId>, Vec<JobId>),
+    /// An ended job is made an unfinished one.
+    Reopen(ReplyId, JobId),
     /// A client requests the deletion of ended jobs.
     Prune,
     /// A report of the store arrives.
@@ -112,11 +114,13 @@ pub(crate) struct World {
     most: Duration,
     /// Period in which the store refuses everything.
     outage: Range<Duration>,
-    /// Processes that return wrong answers now and then, some only when they answer a second time.
+    /// Number of hosts that all processes share; 0: each process has a host of its own.
+    hosts: u32,
+    /// Hosts whose processes return wrong answers now and then, some only when they answer a second time.
     liars: BTreeSet<u32>,
-    /// Processes that gave wrong answers, with the seeds of the jobs.
+    /// Hosts that gave wrong answers, with the seeds of the jobs.
     lies: BTreeSet<(u32, u64)>,
-    /// Banned processes.
+    /// Banned hosts.
     banned: BTreeSet<u32>,
     /// Seed, point and indices of batches that were answered in this run of the coordinator.
     answered_batches: BTreeSet<(u64, u64, u64, u32)>,
@@ -175,6 +179,7 @@ impl World {
             Duration::from_millis(from)..Duration::from_millis(from + length)
         });
         let liars = liars::some(&mut draw);
+        let hosts = if draw(3) == 0 { liars.len() as u32 + 1 + draw(3) as u32 } else { 0 };
         let prune = (draw(3) == 0).then(|| draw(4000));
         let mut world = Self {
             random,
@@ -189,6 +194,7 @@ impl World {
             counts: Counts { outages: u64::from(!outage.is_empty()), ..Counts::default() },
             most: MINUTES,
             outage,
+            hosts,
             liars,
             lies: BTreeSet::new(),
             banned: BTreeSet::new(),
@@ -250,7 +256,10 @@ impl World {
         }
         let jobs = self.store.clone().jobs().unwrap();
         let on_its_way = |happening: &Occurrence| matches!(happening, Occurrence::Forget(..));
-        jobs.iter().all(|job| job.end.is_some()) && !self.agenda.values().any(on_its_way)
+        let doubts = self.store.clone().doubts().unwrap();
+        doubts.iter().all(|doubt| doubt.digest.is_some())
+            && jobs.iter().all(|job| job.end.is_some())
+            && !self.agenda.values().any(on_its_way)
     }
 
     fn happen(&mut self, happening: Occurrence) {
@@ -294,6 +303,7 @@ impl World {
             Occurrence::Cancel(client) => self.cancel(client),
             Occurrence::Read(job, number) => self.read(job, number),
             Occurrence::Forget(reply_id, jobs) => self.forget(reply_id, jobs),
+            Occurrence::Reopen(reply_id, job) => self.reopen(reply_id, job),
             Occurrence::Prune => self.prune(),
         }
     }
@@ -316,6 +326,7 @@ impl World {
                 self.answer_all(worker);
             }
         }
+        self.recheck();
         self.react(Event::Tick);
     }
 
@@ -383,6 +394,7 @@ impl World {
                 | Occurrence::Break(_)
                 | Occurrence::GiveUp(_)
                 | Occurrence::Read(..)
+                | Occurrence::Reopen(..)
                 | Occurrence::Report(_) => {}
                 stays => {
                     self.agenda.insert(at, stays);
@@ -397,7 +409,7 @@ impl World {
         self.cancellations.clear();
         let banned = self.store.bans().unwrap();
         self.counts.remembered += u64::from(!banned.is_empty());
-        self.banned = banned.iter().map(|record| record.worker.process()).collect();
+        self.banned = banned.iter().map(|it| self.host_of(it.worker.process())).collect();
         let restored = Restored::load(&mut self.store).unwrap();
         let (state, effects) = State::restore(self.config, restored, self.now);
         self.state = state;
@@ -432,7 +444,8 @@ impl World {
                 Effect::Revoke { worker, batch } => {
                     self.counts.revoked += 1;
                     let known = self.workers.get_mut(&worker).unwrap();
-                    known.holds.remove(&batch).unwrap();
+                    // An answer that waits for the proof of its worker may be revoked.
+                    known.holds.remove(&batch);
                 }
                 Effect::Close { worker, .. } => {
                     self.counts.closed += 1;
@@ -446,6 +459,9 @@ impl World {
                 Effect::Read { job, number } => self.within(10, Occurrence::Read(job, number)),
                 Effect::Prune { reply_id, jobs } => {
                     self.within(20, Occurrence::Forget(reply_id, jobs))
+                }
+                Effect::Reopen { reply_id, job } => {
+                    self.within(20, Occurrence::Reopen(reply_id, job));
                 }
                 Effect::Answer { reply_id, answer } => self.answered(reply_id, &answer),
                 Effect::Publish { .. } | Effect::Note(_) | Effect::Drain { .. } => {}

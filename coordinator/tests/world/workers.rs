@@ -16,7 +16,8 @@ impl World {
     pub(super) fn attach(&mut self, process: u32) {
         let worker = WorkerId(self.number());
         let threads = 1 + self.draw(4) as u32;
-        let hello = Hello { slots: threads, ..fake::hello(process) };
+        let host = format!("node-{}", self.host_of(process));
+        let hello = Hello { slots: threads, host, ..fake::hello(process) };
         self.workers.insert(worker, Worker { process, heard: self.now, ..Worker::default() });
         self.react(Event::Hello { worker, hello });
     }
@@ -93,7 +94,8 @@ impl World {
         let known = self.workers.get_mut(&worker).unwrap();
         let bad = known.bad;
         assert!(known.holds.insert(batch, work.clone()).is_none(), "a number was given twice");
-        assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX);
+        // One more than it computes: its proof.
+        assert!(known.holds.len() <= BATCHES_IN_FLIGHT_MAX + 1);
         if bad {
             self.within(50, Occurrence::Break(worker));
             return;

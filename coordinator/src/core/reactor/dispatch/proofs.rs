@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use super::{batches, overdue};
+use super::overdue;
 use crate::core::audit;
 use crate::core::ballot::VOTERS_MAX;
 use crate::core::batch::{Assignment, Batch, Purpose};
@@ -55,13 +55,13 @@ fn begin(turn: &mut Turn, id: JobId, setup: SetupKey) -> bool {
     true
 }
 
-/// Asks hosts that have not voted, until so many have, or are asked. Returns whether any is asked.
-pub(crate) fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) -> bool {
+/// Asks hosts that have not voted, until so many have, or are asked.
+fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) {
     let Some(setup) = turn.state.jobs.get(&job).map(|job| job.setup) else {
-        return false;
+        return;
     };
     let Some(proofs) = turn.state.proofs.of(&setup) else {
-        return false;
+        return;
     };
     let state = &*turn.state;
     let asked = proofs.out.keys().filter_map(|id| Some(state.workers.get(id)?.name.host()));
@@ -75,9 +75,7 @@ pub(crate) fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) -> bool
             chosen.push(*id);
         }
     }
-    let any = !chosen.is_empty();
     chosen.into_iter().for_each(|worker| ask(turn, worker, job));
-    any
 }
 
 /// Sends a worker the batch by which it proves itself, unless it has it.
@@ -232,7 +230,7 @@ fn audit_last(evaluation: &mut PendingEvaluation, place: usize, one: Option<&aud
     evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
 }
 
-/// Gives up workers that do not answer, and asks further hosts where no answer has a majority. Returns
+/// Puts workers on probation that do not answer, and asks further hosts where no answer has a majority. Returns
 /// the setups of which something may have been decided.
 pub(crate) fn tick(turn: &mut Turn) -> Vec<SetupKey> {
     let mut changed = Vec::new();
@@ -242,13 +240,14 @@ pub(crate) fn tick(turn: &mut Turn) -> Vec<SetupKey> {
             continue;
         };
         let late = |(_, batch): &(&WorkerId, &BatchId)| overdue::is_overdue(turn.state, **batch, turn.now);
-        let late: Vec<(WorkerId, BatchId)> =
-            proofs.out.iter().filter(late).map(|(worker, batch)| (*worker, *batch)).collect();
-        for (worker, batch) in &late {
-            if let Some(name) = turn.state.workers.get(worker).map(|worker| worker.name.clone()) {
-                overdue::begin_probation(turn.state, &name, turn.now, turn.now);
-            }
-            batches::revoke(turn, *batch);
+        let names = proofs.out.iter().filter(late).filter_map(|(worker, batch)| {
+            let sent = turn.state.batches.get(batch)?.sent;
+            Some((turn.state.workers.get(worker)?.name.clone(), sent))
+        });
+        let late: Vec<(WorkerName, Duration)> = names.collect();
+        // The batch stays with the worker: it may be slow, and its answer ends the probation.
+        for (name, sent) in &late {
+            overdue::begin_probation(turn.state, name, *sent, turn.now);
         }
         let is_undecided = ask_for_majority(turn, &setup);
         if !late.is_empty() || is_undecided {
@@ -258,27 +257,28 @@ pub(crate) fn tick(turn: &mut Turn) -> Vec<SetupKey> {
     changed
 }
 
-/// Asks further hosts where those asked have no majority. Notes since when there are none to be asked.
+/// Asks further hosts where those asked have no majority. Notes since when there is none.
 fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) -> bool {
     let Some(proofs) = turn.state.proofs.of(setup) else {
         return false;
     };
     let voters = voters(turn.state, setup, turn.now);
     let voted = proofs.ballot.count();
-    if voted < 2 || voters > voted || proofs.ballot.lacks(voters) == 0 {
+    let lacks = proofs.ballot.lacks(voters);
+    let now = turn.now;
+    if let Some(proofs) = turn.state.proofs.of_mut(setup) {
+        let undecided = voted > 1 && lacks > 0;
+        proofs.undecided_since = undecided.then(|| proofs.undecided_since.unwrap_or(now));
+    }
+    if voted < 2 || voters > voted || lacks == 0 {
         return false;
     }
-    let more = voted + proofs.ballot.lacks(voters);
     let job = turn.state.active.iter().find(|id| {
         turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup)
     });
     let Some(job) = job.copied() else {
         return false;
     };
-    let is_asked = ask_further(turn, job, more);
-    let now = turn.now;
-    if let Some(proofs) = turn.state.proofs.of_mut(setup) {
-        proofs.undecided_since = if is_asked { None } else { proofs.undecided_since.or(Some(now)) };
-    }
+    ask_further(turn, job, voted + lacks);
     true
 }

@@ -264,7 +264,7 @@ fn undecided(state: &State, job: JobId, now: Duration) -> Option<RunFailure> {
     let setup = state.jobs.get(&job)?.setup;
     if let Some(proofs) = state.proofs.of(&setup)
         && let Some(since) = proofs.undecided_since
-        && now.saturating_sub(since) > state.config.expiry
+        && now.saturating_sub(since) > state.config.expiry * if proofs.out.is_empty() { 1 } else { 2 }
     {
         let contradiction = Box::new(proofs.ballot.contradiction()?);
         return Some(RunFailure::Contradiction { contradiction, point: proofs.point() });
