@@ -29,9 +29,15 @@ mod tests {
     fn velocities_are_bounded_by_the_medium() {
         let optimum = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
         let carried = carried_velocities(&Layers::default(), &optimum).unwrap();
-        for (velocity, is_carried) in
-            [(5e-324, false), (149.0, false), (151.0, true), (3908.8, true), (12e3, true), (1e6, false), (1e308, false)]
-        {
+        for (velocity, is_carried) in [
+            (5e-324, false),
+            (149.0, false),
+            (151.0, true),
+            (3908.8, true),
+            (12e3, true),
+            (1e6, false),
+            (1e308, false),
+        ] {
             assert_eq!(carried.contains(&velocity), is_carried, "{velocity} in {carried:?}");
         }
         let mut inadmissible = optimum;

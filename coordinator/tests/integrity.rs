@@ -118,7 +118,10 @@ async fn a_liar_leaves_no_trace_and_stays_out() {
     assert_eq!(found, (expected.digest, expected.status));
     let listed = client.list_bans(ListBansRequest {}).await.unwrap().into_inner().workers;
     assert_eq!(listed.len(), 1, "{listed:?}");
-    assert_eq!((listed[0].host.as_str(), listed[0].process, &listed[0].job), ("node-2", LIAR, &job));
+    assert_eq!(
+        (listed[0].host.as_str(), listed[0].process, &listed[0].job),
+        ("node-2", LIAR, &job)
+    );
     assert!(listed[0].reason.contains(" agree on "), "{listed:?}");
 
     let bad = PruneRequest { keep_for_s: Some(-1.0), keep_last: None };

@@ -10,11 +10,11 @@ use std::time::Duration;
 
 use osteon_common::version;
 use osteon_coordinator::core::ids::JobId;
-use osteon_coordinator::core::worker_name::WorkerName;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::store::{
-    BanRecord, Changes, EndRecord, EvaluationRecord, JobRecord, Store, StoreError, StoredJob,
+    BanRecord, Changes, DoubtRecord, EndRecord, EvaluationRecord, JobRecord, Store, StoreError,
+    StoredJob,
 };
 use osteon_coordinator::{ComponentFailure, Config, Coordinator, Listener, start};
 use osteon_proto::announced::Received;
@@ -384,12 +384,12 @@ impl Store for BrokenStore {
         self.sound.bans()
     }
 
-    fn ended_jobs_of(&mut self, worker: &WorkerName) -> Result<Vec<JobId>, StoreError> {
-        self.sound.ended_jobs_of(worker)
+    fn doubts(&mut self) -> Result<Vec<DoubtRecord>, StoreError> {
+        self.sound.doubts()
     }
 
-    fn delete_bans(&mut self) -> Result<(), StoreError> {
-        self.sound.delete_bans()
+    fn reopen_job(&mut self, job: JobId) -> Result<Option<StoredJob>, StoreError> {
+        self.sound.reopen_job(job)
     }
 }
 

@@ -82,6 +82,27 @@ fn workers_that_never_answer_cost_seconds() {
     }
 }
 
+/// As where a network file system hangs on most nodes of a cluster.
+#[test]
+fn many_workers_that_never_answer_do_not_keep_a_sound_one_from_its_work() {
+    // 1.5 s on one worker of two threads.
+    let job = fake::propagation(3000, 5);
+    let undisturbed = run(1, (0, 1), 0.01, &job);
+    for faulty in [1, 5, 50, 100] {
+        let disturbed = run(1, (faulty, 1), 0.01, &job);
+        println!("{faulty} beside one: {undisturbed:?}, {disturbed:?}");
+        assert!(disturbed.time < 4 * undisturbed.time, "{faulty}: {disturbed:?}");
+    }
+    let long = fake::propagation(60_000, 5);
+    let undisturbed = run(1, (0, 1), 0.01, &long);
+    for faulty in [1, 50] {
+        let disturbed = run(1, (faulty, 1), 0.01, &long);
+        println!("{faulty} beside one: {undisturbed:?}, {disturbed:?}");
+        let delay = disturbed.time.saturating_sub(undisturbed.time);
+        assert!(delay < Duration::from_secs(10), "{faulty}: {delay:?}");
+    }
+}
+
 #[test]
 fn each_batch_that_is_not_answered_costs_seconds() {
     for job in jobs() {

@@ -11,9 +11,9 @@ use osteon_common::job::{JobKind, JobSpecification, Sampling};
 use osteon_common::moments::KolmogorovTest;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, RealizationResult};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::results::{Integrity, 
+use osteon_common::results::{
     BestPoint, DataSummary, DecayEstimate, Estimate, EstimatedError, Evaluation, EvaluationRole,
-    GroupResult, JobFailure, JobResult, Moments, PointMeaning, Status as JobEnd,
+    GroupResult, Integrity, JobFailure, JobResult, Moments, PointMeaning, Status as JobEnd,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::version::Program;

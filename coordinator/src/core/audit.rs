@@ -4,7 +4,7 @@ use std::fmt;
 
 use osteon_proto::identity::{self, NoRandomness};
 
-use crate::core::ids::{BatchId, JobId};
+use crate::core::ids::{BatchId, JobId, LeaseId};
 use crate::core::indices::Indices;
 
 /// Key that decides which batches are audited. It is a secret of a running coordinator, since a
@@ -50,22 +50,31 @@ pub(crate) fn choose(
     (key, fraction): (&AuditKey, f64),
     (batch, slots): (BatchId, u32),
     answered: Indices,
-    left: Option<f64>,
+    left: f64,
 ) -> (Option<Indices>, f64) {
     let share = (fraction * answered.count as f64).ceil() as u64;
     let length = share.max(slots.into()).clamp(1, answered.count);
-    let distance =
-        |u: f64| if fraction >= 1.0 { 0.0 } else { 2.0 * u * length as f64 / fraction };
     let drawn = |what| uniform(key, [batch.0, answered.first, what]);
-    let left = left.unwrap_or_else(|| distance(drawn(0))) - answered.count as f64;
+    let left = left - answered.count as f64;
     if left > 0.0 {
         return (None, left);
     }
     let room = answered.count - length + 1;
-    let offset = ((drawn(1) * room as f64) as u64).min(room - 1);
+    let offset = ((drawn(0) * room as f64) as u64).min(room - 1);
     let audited = Indices { first: answered.first + offset, count: length };
     // What this batch had too much counts for the next ones, so that the fraction is kept.
-    (Some(audited), if fraction >= 1.0 { 0.0 } else { left + distance(drawn(2)) })
+    let next = if fraction >= 1.0 { 0.0 } else { left + distance(fraction, length, drawn(1)) };
+    (Some(audited), next)
+}
+
+/// Returns how many realizations a worker with `slots` slots computes until the first ones are audited.
+pub(crate) fn first((key, fraction): (&AuditKey, f64), lease: LeaseId, slots: u32) -> f64 {
+    distance(fraction, slots.into(), uniform(key, [lease.0, 0, 2]))
+}
+
+/// Returns the number of realizations for which this many audited ones are the fraction, times 2 u.
+fn distance(fraction: f64, audited: u64, u: f64) -> f64 {
+    if fraction >= 1.0 { 0.0 } else { 2.0 * u * audited as f64 / fraction }
 }
 
 /// Returns one index of `answered`, drawn by the key.
@@ -109,14 +118,14 @@ mod tests {
     /// Returns the fraction of the realizations that is audited, and the most that a worker computes between
     /// two audits, over many batches of this size.
     fn audited(fraction: f64, slots: u32, count: u64) -> (f64, u64) {
-        let (mut left, mut audited, mut since, mut longest) = (None, 0, 0, 0);
+        let first = first((&AuditKey([7; 32]), fraction), LeaseId(1), slots);
+        let (mut left, mut audited, mut since, mut longest) = (first, 0, 0, 0);
         let batches = 400_000 / count;
         for batch in 0..batches {
             let answered = Indices { first: batch * count, count };
             let key = &AuditKey([7; 32]);
-            let (chosen, next) =
-                choose((key, fraction), (BatchId(batch), slots), answered, left);
-            left = Some(next);
+            let (chosen, next) = choose((key, fraction), (BatchId(batch), slots), answered, left);
+            left = next;
             since += count;
             if let Some(chosen) = chosen {
                 assert!(chosen.first >= answered.first && chosen.end() <= answered.end());
@@ -130,9 +139,14 @@ mod tests {
 
     #[test]
     fn realizations_are_audited_often_and_few_at_a_time() {
-        for (fraction, slots, count) in
-            [(0.01, 1, 1), (0.01, 1, 100), (0.01, 16, 7), (0.01, 16, 3000), (0.3, 2, 40), (0.01, 4, 50)]
-        {
+        for (fraction, slots, count) in [
+            (0.01, 1, 1),
+            (0.01, 1, 100),
+            (0.01, 16, 7),
+            (0.01, 16, 3000),
+            (0.3, 2, 40),
+            (0.01, 4, 50),
+        ] {
             let (found, longest) = audited(fraction, slots, count);
             assert!((0.9..1.15).contains(&(found / fraction)), "{found} of {fraction}");
             let most = 2.0 * f64::from(slots).max(fraction * count as f64 + 1.0) / fraction;

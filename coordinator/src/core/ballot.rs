@@ -89,6 +89,23 @@ impl Ballot {
         self.votes.len()
     }
 
+    /// Returns the same votes about one of the realizations.
+    pub(crate) fn about(&self, index: u64) -> Self {
+        let mut about = Self::new(Indices { first: index, count: 1 });
+        let at = usize::try_from(index.saturating_sub(self.indices.first)).unwrap_or(usize::MAX);
+        for (by, place) in self.votes.values() {
+            if let Some(one) = self.answers[*place].0.get(at) {
+                about.cast(Vote { by: by.clone(), solved: vec![*one] });
+            }
+        }
+        about
+    }
+
+    /// Returns the workers whose answers are the votes.
+    pub(crate) fn voters(&self) -> impl Iterator<Item = &WorkerName> {
+        self.votes.values().map(|(by, _)| by)
+    }
+
     /// Adds the vote of a worker's host.
     pub(crate) fn cast(&mut self, Vote { by, solved }: Vote) -> Cast {
         let known = self.answers.iter().position(|(answer, _)| same_bits(answer, &solved));
@@ -140,7 +157,10 @@ impl Ballot {
             self.difference((first, answer(right)), (by, answer(*place)))
         };
         let outvoted = votes().filter_map(differs).collect();
-        Some(Verdict { agreeing: agreeing.iter().map(|by| by.host().to_owned()).collect(), outvoted })
+        Some(Verdict {
+            agreeing: agreeing.iter().map(|by| by.host().to_owned()).collect(),
+            outvoted,
+        })
     }
 
     /// Returns two votes that differ, at the first index where they do.

@@ -64,7 +64,8 @@ impl Doubts {
         let (open, settled): (Vec<_>, Vec<_>) =
             self.bans.iter().partition(|(_, before)| before.is_none());
         let concerned = if open.is_empty() { settled } else { open };
-        let mut banned_hosts: Vec<String> = concerned.iter().filter_map(|(ban, _)| of(ban)).collect();
+        let mut banned_hosts: Vec<String> =
+            concerned.iter().filter_map(|(ban, _)| of(ban)).collect();
         banned_hosts.sort_unstable();
         banned_hosts.dedup();
         let (_, earlier_digest) = concerned.last()?;

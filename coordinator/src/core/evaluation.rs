@@ -232,7 +232,10 @@ impl PendingEvaluation {
         self.results.fill(first, solved, owner);
         let own = self.results.owner(first) == Some(owner);
         if let Some(last) = self.last_answers.get_mut(place).filter(|_| own) {
-            *last = Indices { first: indices.first, count: self.results.of_same_owner(first, most) as u64 };
+            *last = Indices {
+                first: indices.first,
+                count: self.results.of_same_owner(first, most) as u64,
+            };
             self.vouched.remove(&place);
         }
     }

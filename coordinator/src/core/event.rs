@@ -10,8 +10,8 @@ use crate::core::close_reason::CloseReason;
 use crate::core::completion::{Completed, Gathered};
 use crate::core::effect::RecordKey;
 use crate::core::ids::{BatchId, JobId, ReplyId, WorkerId};
-use crate::store::StoredJob;
 use crate::store::EvaluationRecord;
+use crate::store::StoredJob;
 
 /// An event.
 #[derive(Debug, Clone, PartialEq)]

@@ -50,7 +50,8 @@ impl StateMeasurements {
             |then: Option<Duration>| then.map_or(Duration::ZERO, |it| now.saturating_sub(it));
         let mut measured = Self {
             jobs_ended: state.ended.len() as u64,
-            workers_banned: state.banned.iter().filter(|it| it.record.lifted.is_none()).count() as u64,
+            workers_banned: state.banned.iter().filter(|it| it.record.lifted.is_none()).count()
+                as u64,
             batches_in_flight: state.batches.len() as u64,
             oldest_batch: since(state.batches.values().map(|batch| batch.sent).min()),
             store_refusing: since(refused_since(state)),

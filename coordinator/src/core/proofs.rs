@@ -5,6 +5,10 @@
 //! a defect may show with one and not with another. The proofs of all hosts are votes of one ballot, so
 //! that it is known at once who is right. They are kept while the coordinator runs, also those of hosts
 //! that have left.
+//!
+//! When two hosts are found to differ at a realization, it becomes the one by which all prove themselves:
+//! one that tells sound from broken hosts. So a later host decides what two could not, and until then no
+//! result of theirs counts.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -21,9 +25,11 @@ use crate::core::ids::{BatchId, WorkerId};
 use crate::core::indices::Indices;
 use crate::core::worker_name::WorkerName;
 
-/// Number of realizations of a proof: so few that short jobs can pay for them, so many that a defect
-/// that shows in one of two realizations is seen nearly always.
-const REALIZATIONS: u64 = 4;
+/// Maximum number of realizations of a proof. Many of them show a defect that is seldom seen.
+const REALIZATIONS_MAX: u64 = 16;
+/// Number of realizations of an evaluation for each one of a proof beyond the first, so that short jobs can
+/// pay for the proofs of several hosts.
+const REALIZATIONS_DIVISOR: u64 = 300;
 /// Number of setups whose proofs are remembered.
 const SETUPS_MAX: usize = 64;
 /// Number of workers of which it is remembered that they gave a proof.
@@ -146,7 +152,10 @@ impl Proofs {
                 self.0.remove(&oldest);
             }
         }
-        let indices = Indices { first: 0, count: realizations.clamp(1, REALIZATIONS) };
+        let indices = Indices {
+            first: 0,
+            count: (1 + realizations / REALIZATIONS_DIVISOR).min(REALIZATIONS_MAX),
+        };
         let proofs = SetupProofs {
             input: Arc::new(input),
             ballot: Ballot::new(indices),
@@ -156,6 +165,19 @@ impl Proofs {
             used: now,
         };
         self.0.insert(setup, proofs);
+    }
+
+    /// Replaces what is computed for a setup, with votes that are known. No batch for it may be out.
+    pub(crate) fn replace(
+        &mut self,
+        setup: SetupKey,
+        (input, ballot): (EvaluationInput, Ballot),
+        now: Duration,
+    ) {
+        let given = ballot.voters().cloned().collect();
+        let (input, out) = (Arc::new(input), BTreeMap::new());
+        let undecided_since = None;
+        self.0.insert(setup, SetupProofs { input, ballot, out, given, undecided_since, used: now });
     }
 
     /// Notes that a setup is in use.

@@ -77,7 +77,9 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::Doubted { ban, jobs } => {
             doubts::note(turn.state, ban, jobs, turn.now);
         }
-        Event::Reopened { reply_id, job, outcome } => recheck::reopened(turn, reply_id, job, outcome),
+        Event::Reopened { reply_id, job, outcome } => {
+            recheck::reopened(turn, reply_id, job, outcome)
+        }
         Event::Drain => {
             ticks::save_parts(turn, true);
             workers::drain_all(turn);

@@ -165,8 +165,8 @@ pub(crate) struct AttachedWorker {
     pub(crate) proven: BTreeSet<SetupKey>,
     /// Answers to batches that it holds, which came before its proof.
     pub(crate) early: Vec<EarlyAnswer>,
-    /// Number of realizations that it computes until the next ones are audited; `None` before the first.
-    pub(crate) until_audit: Option<f64>,
+    /// Number of realizations that it computes until the next ones are audited.
+    pub(crate) until_audit: f64,
     /// Batches that it answered or that were revoked, newest last.
     pub(crate) settled: VecDeque<(BatchId, Assignment)>,
     /// Its rate over all jobs.
@@ -387,6 +387,14 @@ impl State {
     pub(crate) fn answers_batches(&self, of: impl Fn(&WorkerName) -> bool) -> bool {
         let answers = |worker: &AttachedWorker| of(&worker.name) && self.is_sound(worker);
         !self.draining && self.workers.values().any(answers)
+    }
+
+    /// Counts realizations of a worker that are checked beside the audits that are due: these come later by as
+    /// much, so that all checks together keep the fraction.
+    pub(crate) fn count_checked(&mut self, name: &WorkerName, count: u64) {
+        let fraction = self.config.audit_fraction;
+        let stays = self.workers.values_mut().filter(|worker| worker.name == *name);
+        stays.for_each(|worker| worker.until_audit += count as f64 / fraction);
     }
 
     /// Returns whether an attached worker of another host answers batches, so that it can check answers.

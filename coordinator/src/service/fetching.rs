@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use futures::{Stream, StreamExt as _, stream};
 use osteon_common::limits::{FETCH_SECONDS_MAX, READER_STALL_SECONDS_MAX};
-use osteon_common::results::{Integrity, JobResult};
 use osteon_common::outcomes::Outcomes;
+use osteon_common::results::{Integrity, JobResult};
 use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::{FetchResponse, HistoryBlock};

@@ -16,8 +16,9 @@ use osteon_proto::v1::{
     BackupRequest, BackupResponse, BannedWorker, CancelRequest, CancelResponse, DrainWorkerRequest,
     DrainWorkerResponse, ExplainRequest, ExplainResponse, FetchRequest, FetchResponse, GetRequest,
     GetResponse, JobSnapshot, LiftBanRequest, LiftBanResponse, ListBansRequest, ListBansResponse,
-    ListRequest, ListResponse, ListWorkersRequest, ListWorkersResponse, PruneRequest, PruneResponse,
-    RecheckRequest, RecheckResponse, SubmitRequest, SubmitResponse, WatchRequest, WatchResponse,
+    ListRequest, ListResponse, ListWorkersRequest, ListWorkersResponse, PruneRequest,
+    PruneResponse, RecheckRequest, RecheckResponse, SubmitRequest, SubmitResponse, WatchRequest,
+    WatchResponse,
 };
 use osteon_proto::{specification, status};
 use tokio::sync::mpsc::error::SendTimeoutError;
@@ -35,8 +36,8 @@ use crate::core::event::{self, Retention};
 use crate::core::ids::{JobId, WorkerId};
 use crate::service::fetching;
 use crate::service::observers;
-use crate::store::{BanRecord, EndRecord};
 use crate::store::thread::StoreCommand;
+use crate::store::{BanRecord, EndRecord};
 
 /// Maximum number of jobs in one page.
 const PAGE_JOBS_MAX: u32 = 1000;
@@ -370,9 +371,7 @@ fn refused(refusal: &Refusal) -> Status {
         Refusal::NoWorker { worker } => {
             status::not_found(Resource::Worker, worker.to_string(), message)
         }
-        Refusal::NotBanned { host } => {
-            status::not_found(Resource::Host, host.clone(), message)
-        }
+        Refusal::NotBanned { host } => status::not_found(Resource::Host, host.clone(), message),
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
         Refusal::TooManyJobs { .. } | Refusal::TooMuchQueued { .. } => {
             status::resource_exhausted(message, RETRY)

@@ -90,7 +90,8 @@ fn report_doubts(store: &mut dyn Store, record: &Record, report: &mut dyn FnMut(
     match store.doubts() {
         Ok(doubts) => {
             let of_ban = |doubt: &DoubtRecord| doubt.ban == ban.number;
-            let jobs: Vec<JobId> = doubts.into_iter().filter(of_ban).map(|doubt| doubt.job).collect();
+            let jobs: Vec<JobId> =
+                doubts.into_iter().filter(of_ban).map(|doubt| doubt.job).collect();
             if !jobs.is_empty() {
                 report(Event::Doubted { ban: ban.number, jobs });
             }

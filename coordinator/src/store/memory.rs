@@ -138,7 +138,8 @@ impl Store for MemoryStore {
         let mut content = self.content();
         if content.bans.insert(record.number, record.clone()).is_none() {
             let host = record.worker.host();
-            let of_host = content.evaluations.values().filter(|it| WorkerName::any_of(&it.workers, host));
+            let of_host =
+                content.evaluations.values().filter(|it| WorkerName::any_of(&it.workers, host));
             let jobs: BTreeSet<JobId> = of_host.map(|evaluation| evaluation.job).collect();
             for job in jobs {
                 if content.jobs.get(&job).is_some_and(|job| job.end.is_some()) {

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
+use osteon_common::outcome::RealizationResult;
 use osteon_common::results::JobResult;
 use osteon_coordinator::config::Config;
 use osteon_coordinator::core::completion::{Completed, Completion};
@@ -14,9 +15,9 @@ use osteon_coordinator::core::ids::{BatchId, JobId, ReplyId, WorkerId};
 use osteon_coordinator::core::reactor::react;
 use osteon_coordinator::core::sanity::sanity_check;
 use osteon_coordinator::core::state::State;
-use osteon_coordinator::store::EndRecord;
 use osteon_coordinator::store::job_output;
 use osteon_coordinator::store::memory::MemoryStore;
+use osteon_coordinator::store::{BanRecord, EndRecord, Store as _};
 use osteon_proto::batch::Work;
 
 use crate::fake;
@@ -41,6 +42,8 @@ enum Occurrence {
     Revoked(WorkerId, BatchId),
     /// A thread of a worker finishes a realization of a batch.
     Realized(WorkerId, BatchId),
+    /// A process of a host is started, or started again.
+    Start(String, Machines),
     Complete(Completion),
     Completed(Completed),
     Write(Record),
@@ -64,6 +67,57 @@ struct Worker {
     batches: BTreeMap<BatchId, Held>,
     /// It never answers one in this many of the batches; `None`: it answers all.
     ignores_every: Option<u64>,
+    /// How it computes wrongly.
+    fault: Option<Fault>,
+    /// Number of realizations that it has answered.
+    answered: u64,
+}
+
+/// Some machines of one kind, each with a host name of its own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Machines {
+    pub(crate) hosts: u32,
+    /// Number of worker processes on each of them, of one thread.
+    pub(crate) processes: u32,
+    /// How they compute wrongly.
+    pub(crate) fault: Option<Fault>,
+    /// Their processes end and are started again after this long.
+    pub(crate) restart: Option<Duration>,
+}
+
+/// How a machine computes wrongly: always by the same amount, so that machines with the same fault agree.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Fault {
+    /// Every realization.
+    Always,
+    /// Every realization after this number of right ones, of each process.
+    After(u64),
+    /// Realizations whose index is a multiple of this number.
+    Every(u64),
+    /// Every realization, differently on each host.
+    EachItsOwn,
+}
+
+impl Fault {
+    /// Changes an answer to realizations from `first` on, given by a process that answered so many before.
+    fn befall(self, host: &str, before: u64, first: u64, solved: &mut [RealizationResult]) {
+        for (count, one) in (0..).zip(solved) {
+            let is_wrong = match self {
+                Self::Always | Self::EachItsOwn => true,
+                Self::After(right) => before + count >= right,
+                Self::Every(n) => (first + count).is_multiple_of(n),
+            };
+            let factor = match self {
+                Self::EachItsOwn => 1e-7 * (1.0 + host.len() as f64),
+                _ => 1e-7,
+            };
+            if let Ok(velocity) = &mut one.outcome
+                && is_wrong
+            {
+                *velocity *= 1.0 + factor;
+            }
+        }
+    }
 }
 
 struct Held {
@@ -94,6 +148,14 @@ pub(crate) struct Clockwork {
     pub(crate) sent: u64,
     /// Number of batches that were never answered.
     pub(crate) ignored: u64,
+    /// Number of realizations that were answered.
+    pub(crate) computed: u64,
+    processes: u32,
+    /// The host of each worker.
+    hosts: BTreeMap<WorkerId, String>,
+    /// Hosts that were banned.
+    pub(crate) banned: BTreeSet<String>,
+    jobs: u64,
 }
 
 impl Clockwork {
@@ -127,6 +189,11 @@ impl Clockwork {
             ends: BTreeMap::new(),
             sent: 0,
             ignored: 0,
+            computed: 0,
+            processes: 0,
+            hosts: BTreeMap::new(),
+            banned: BTreeSet::new(),
+            jobs: 0,
         };
         for (process, &threads) in (1..).zip(threads) {
             let worker = WorkerId(process.into());
@@ -135,6 +202,8 @@ impl Clockwork {
                 queue: VecDeque::new(),
                 batches: BTreeMap::new(),
                 ignores_every: None,
+                fault: None,
+                answered: 0,
             };
             clockwork.workers.insert(worker, idle);
             let hello = Hello { slots: threads, ..fake::hello(process) };
@@ -142,6 +211,79 @@ impl Clockwork {
         }
         clockwork.after(TICK, Occurrence::Tick);
         clockwork
+    }
+
+    /// Returns machines that are there from the beginning.
+    pub(crate) fn of_machines(machines: &[Machines], realization: Duration) -> Self {
+        let mut clockwork = Self::with(&[], Times::Equal, realization, Config::default());
+        for (kind, machines) in machines.iter().enumerate() {
+            for host in 0..machines.hosts {
+                let name = format!("{kind}{}", "-".repeat(host as usize + 1));
+                for _ in 0..machines.processes {
+                    clockwork.start(name.clone(), *machines);
+                }
+            }
+        }
+        clockwork
+    }
+
+    fn start(&mut self, host: String, machines: Machines) {
+        self.processes += 1;
+        let (process, fault) = (self.processes, machines.fault);
+        let worker = WorkerId(process.into());
+        let idle = Worker {
+            idle_threads: 1,
+            queue: VecDeque::new(),
+            batches: BTreeMap::new(),
+            ignores_every: None,
+            fault,
+            answered: 0,
+        };
+        self.workers.insert(worker, idle);
+        self.hosts.insert(worker, host.clone());
+        let hello = Hello { slots: 1, host: host.clone(), ..fake::hello(process) };
+        self.react(Event::Hello { worker, hello });
+        if let Some(after) = machines.restart {
+            self.after(after, Occurrence::Start(host, machines));
+        }
+    }
+
+    /// Starts a process of a host in place of its oldest one.
+    fn start_again(&mut self, host: String, machines: Machines) {
+        let of_host = |id: &&WorkerId| self.hosts.get(id) == Some(&host);
+        if let Some(worker) = self.workers.keys().find(of_host).copied() {
+            self.workers.remove(&worker);
+            self.react(Event::StreamEnded { worker });
+        }
+        self.start(host, machines);
+    }
+
+    /// Runs a job to its end.
+    pub(crate) fn run_one(&mut self, specification: &JobSpecification) -> Ended {
+        self.jobs += 1;
+        let job = JobId(self.jobs);
+        self.unfinished.insert(job);
+        let request = fake::submission(specification, "");
+        self.react(Event::Requested { reply_id: ReplyId(job.0), request });
+        self.finish();
+        self.end(job)
+    }
+
+    /// Computes the ended jobs again that a banned host contributed to; returns all jobs as they are then.
+    pub(crate) fn recheck(&mut self) -> Vec<Ended> {
+        let doubts = self.store.doubts().unwrap();
+        for job in doubts.iter().filter(|doubt| doubt.digest.is_none()).map(|doubt| doubt.job) {
+            self.unfinished.insert(job);
+            let request = Request::Recheck(job);
+            self.react(Event::Requested { reply_id: ReplyId(job.0), request });
+        }
+        self.finish();
+        (1..=self.jobs).map(|job| self.end(JobId(job))).collect()
+    }
+
+    fn end(&mut self, job: JobId) -> Ended {
+        let (at, end) = self.ends[&job].clone();
+        Ended { at, result: job_output::read(&mut self.store, &end).unwrap().result }
     }
 
     /// Makes a worker that sends heartbeats never answer one in `n` of the batches.
@@ -159,18 +301,22 @@ impl Clockwork {
             }
             self.react(Event::Requested { reply_id: ReplyId(number), request });
         }
-        while !self.unfinished.is_empty() {
-            let ((at, _), happening) = self.agenda.pop_first().expect("something is to happen");
-            assert!(at < DAY, "still not done: {:?}", self.state);
-            self.now = at;
-            self.happen(happening);
-        }
+        self.finish();
         let mut ended = Vec::new();
         for (at, end) in std::mem::take(&mut self.ends).into_values() {
             let result = job_output::read(&mut self.store, &end).unwrap().result;
             ended.push(Ended { at, result });
         }
         ended
+    }
+
+    fn finish(&mut self) {
+        while !self.unfinished.is_empty() {
+            let ((at, _), happening) = self.agenda.pop_first().expect("something is to happen");
+            assert!(at < DAY, "still not done: {:?}", self.state);
+            self.now = at;
+            self.happen(happening);
+        }
     }
 
     fn after(&mut self, time: Duration, happening: Occurrence) {
@@ -191,7 +337,9 @@ impl Clockwork {
             Occurrence::Event(event) => self.react(event),
             Occurrence::Batch(worker, batch, work) => {
                 self.sent += 1;
-                let known = self.workers.get_mut(&worker).unwrap();
+                let Some(known) = self.workers.get_mut(&worker) else {
+                    return;
+                };
                 if known.ignores_every.is_some_and(|n| self.sent.is_multiple_of(n)) {
                     self.ignored += 1;
                     return;
@@ -201,19 +349,29 @@ impl Clockwork {
                 self.begin(worker);
             }
             Occurrence::Revoked(worker, batch) => {
-                let known = self.workers.get_mut(&worker).unwrap();
-                known.queue.retain(|(queued, _)| *queued != batch);
-                known.batches.remove(&batch);
+                if let Some(known) = self.workers.get_mut(&worker) {
+                    known.queue.retain(|(queued, _)| *queued != batch);
+                    known.batches.remove(&batch);
+                }
             }
             Occurrence::Realized(worker, batch) => {
-                self.workers.get_mut(&worker).unwrap().idle_threads += 1;
-                self.realized(worker, batch);
-                self.begin(worker);
+                if let Some(known) = self.workers.get_mut(&worker) {
+                    known.idle_threads += 1;
+                    self.realized(worker, batch);
+                    self.begin(worker);
+                }
             }
+            Occurrence::Start(host, machines) => self.start_again(host, machines),
             Occurrence::Complete(completion) => self.complete(completion),
             Occurrence::Completed(completed) => self.react(Event::Completed(completed)),
             Occurrence::Write(record) => {
                 let event = fake::written(&mut self.store, &record);
+                if let Record::Ban(BanRecord { number, worker, .. }) = &record {
+                    self.banned.insert(worker.host().to_owned());
+                    let doubts = self.store.doubts().unwrap().into_iter();
+                    let jobs = doubts.filter(|it| it.ban == *number).map(|it| it.job).collect();
+                    self.react(Event::Doubted { ban: *number, jobs });
+                }
                 if let Record::End { end, .. } = record {
                     self.unfinished.remove(&end.job);
                     self.ends.insert(end.job, (self.now, end));
@@ -252,7 +410,12 @@ impl Clockwork {
         held.realized += 1;
         if held.realized == held.work.count {
             let elapsed_s = (self.now - held.begun).as_secs_f64();
-            let solved = fake::solved(&held.work);
+            let mut solved = fake::solved(&held.work);
+            if let Some(fault) = known.fault {
+                fault.befall(&self.hosts[&worker], known.answered, held.work.first, &mut solved);
+            }
+            known.answered += solved.len() as u64;
+            self.computed += solved.len() as u64;
             known.batches.remove(&batch);
             let answer = Event::Answered { worker, batch, solved, elapsed_s };
             self.after(MESSAGE, Occurrence::Event(answer));
@@ -281,7 +444,19 @@ impl Clockwork {
                     self.after(RECORD, Occurrence::Complete(completion))
                 }
                 Effect::Store(record) => self.after(RECORD, Occurrence::Write(record)),
-                Effect::Close { worker, reason } => panic!("{worker} is closed: {reason}"),
+                Effect::Close { worker, reason } => {
+                    let host = self.hosts.get(&worker);
+                    assert!(host.is_some(), "{worker} is closed: {reason}");
+                    self.workers.remove(&worker);
+                }
+                Effect::Read { job, number } => {
+                    let event = fake::read(&mut self.store, job, number);
+                    self.after(RECORD, Occurrence::Event(event));
+                }
+                Effect::Reopen { reply_id, job } => {
+                    let outcome = Ok(self.store.reopen_job(job).unwrap());
+                    self.react(Event::Reopened { reply_id, job, outcome });
+                }
                 _ => {}
             }
         }

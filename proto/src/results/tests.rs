@@ -12,7 +12,9 @@ use osteon_common::inference::{
 use osteon_common::job::{Prior, Sampling, SearchMethod};
 use osteon_common::moments::{ConfidenceInterval, MomentIntervals, Outlier};
 use osteon_common::parameters::{AS_IN_SETUP, BONE_PARAMETERS, Parameter, Point};
-use osteon_common::results::{Integrity, DataSummary, DecayEstimate, JobFailure, PointMeaning, Status};
+use osteon_common::results::{
+    DataSummary, DecayEstimate, Integrity, JobFailure, PointMeaning, Status,
+};
 
 /// Any number, including both zeros, infinities and subnormal numbers.
 pub(crate) fn number() -> impl Strategy<Value = f64> {

@@ -84,8 +84,7 @@ pub(super) fn all(connection: &Connection) -> rusqlite::Result<Vec<Result<BanRec
 pub(super) fn doubts(connection: &Connection) -> rusqlite::Result<Vec<Result<DoubtRecord, JobId>>> {
     let sql = "SELECT job, ban, digest, checksum FROM doubt ORDER BY job, ban";
     let read = |row: &Row<'_>| {
-        let record =
-            DoubtRecord { job: JobId(row.get(0)?), ban: row.get(1)?, digest: row.get(2)? };
+        let record = DoubtRecord { job: JobId(row.get(0)?), ban: row.get(1)?, digest: row.get(2)? };
         let found: Vec<u8> = row.get(3)?;
         Ok(if found == doubt_checksum(&record) { Ok(record) } else { Err(record.job) })
     };
@@ -95,13 +94,15 @@ pub(super) fn doubts(connection: &Connection) -> rusqlite::Result<Vec<Result<Dou
 /// Deletes the end of a job and the summary of its result, whose digest is kept with the doubts about it.
 pub(super) fn reopen(connection: &Connection, job: JobId) -> rusqlite::Result<()> {
     let sql = "SELECT digest FROM summary WHERE job = ?1";
-    let digest: Option<String> =
-        connection.query_row(sql, [job.0], |row| row.get(0)).optional()?;
+    let digest: Option<String> = connection.query_row(sql, [job.0], |row| row.get(0)).optional()?;
     let sql = "SELECT ban FROM doubt WHERE job = ?1 AND digest IS NULL";
     let bans: Vec<u64> =
         connection.prepare(sql)?.query_map([job.0], |row| row.get(0))?.collect::<Result<_, _>>()?;
     for ban in bans {
-        put_doubt(connection, &DoubtRecord { job, ban, digest: Some(digest.clone().unwrap_or_default()) })?;
+        put_doubt(
+            connection,
+            &DoubtRecord { job, ban, digest: Some(digest.clone().unwrap_or_default()) },
+        )?;
     }
     for table in ["summary", "ending"] {
         connection.execute(&format!("DELETE FROM {table} WHERE job = ?1"), [job.0])?;

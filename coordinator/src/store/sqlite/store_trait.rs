@@ -8,8 +8,8 @@ use osteon_search::Summary;
 use super::SqliteStore;
 use crate::core::ids::JobId;
 use crate::store::{
-    BanRecord, BetweenPieces, Changes, DoubtRecord, EndRecord, EvaluationRecord, JobRecord, PartRecord,
-    PieceRecord, Store, StoreError, StoredJob,
+    BanRecord, BetweenPieces, Changes, DoubtRecord, EndRecord, EvaluationRecord, JobRecord,
+    PartRecord, PieceRecord, Store, StoreError, StoredJob,
 };
 
 impl Store for SqliteStore {

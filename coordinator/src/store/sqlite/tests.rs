@@ -14,8 +14,8 @@ use osteon_common::results::{EstimatedError, EvaluationRole, GroupEnding, Status
 
 use super::acknowledged::MarkFile;
 use super::opening::{FILE, Journal, open_file};
-use crate::core::worker_name::WorkerName;
 use super::*;
+use crate::core::worker_name::WorkerName;
 
 mod damage;
 mod groups;
@@ -185,7 +185,10 @@ fn a_ban_makes_the_ended_jobs_of_its_host_doubtful_until_they_are_begun_again() 
     drop(store);
     let mut store = SqliteStore::open(directory.path()).unwrap();
     assert_eq!(store.doubts().unwrap(), [doubt(6, Some(summary(1).digest))]);
-    assert_eq!((store.jobs().unwrap()[0].end.clone(), store.summary(JobId(1)).unwrap()), (None, None));
+    assert_eq!(
+        (store.jobs().unwrap()[0].end.clone(), store.summary(JobId(1)).unwrap()),
+        (None, None)
+    );
     // The first digest remains if it is begun again once more.
     store.finish_job(&end(1), &summary(3)).unwrap();
     store.reopen_job(JobId(1)).unwrap();

@@ -79,9 +79,8 @@ fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
         let reputation =
             |worker: &AttachedWorker| poison::reputation(state, worker, &dispute.crashes);
         let asked = dispute.tie_breakers.iter().filter_map(|id| state.batches.get(id));
-        let asked: Vec<&str> = asked
-            .filter_map(|batch| Some(state.workers.get(&batch.worker)?.name.host()))
-            .collect();
+        let asked: Vec<&str> =
+            asked.filter_map(|batch| Some(state.workers.get(&batch.worker)?.name.host())).collect();
         let may = |worker: &&AttachedWorker| {
             let host = worker.name.host();
             !worker.draining && !dispute.has_vote_of(host) && !asked.contains(&host)
@@ -103,8 +102,7 @@ pub(crate) fn lacks_votes(state: &State, dispute: &Dispute) -> bool {
 /// answer batches, at most as many as are asked. With the time, hosts do not count that were asked and have
 /// not answered for too long.
 pub(crate) fn voters(state: &State, dispute: &Dispute, now: Option<Duration>) -> usize {
-    let is_late =
-        |id: &&BatchId| now.is_some_and(|now| overdue::is_overdue(state, **id, now));
+    let is_late = |id: &&BatchId| now.is_some_and(|now| overdue::is_overdue(state, **id, now));
     let late = dispute.tie_breakers.iter().filter(is_late).filter_map(|id| state.batches.get(id));
     let late: Vec<WorkerId> = late.map(|batch| batch.worker).collect();
     let answers = |(id, worker): &(&WorkerId, &AttachedWorker)| {

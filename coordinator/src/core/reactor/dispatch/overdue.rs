@@ -296,7 +296,8 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
         }
     };
     let is_check = !batch.purpose.fills();
-    let in_common = |holder: &WorkerName| holder == name || (is_check && holder.host() == name.host());
+    let in_common =
+        |holder: &WorkerName| holder == name || (is_check && holder.host() == name.host());
     !in_question && !holders(state, id).any(in_common)
 }
 

@@ -3,9 +3,11 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use super::overdue;
+use osteon_common::parameters::Point;
+
+use super::{batches, overdue};
 use crate::core::audit;
-use crate::core::ballot::VOTERS_MAX;
+use crate::core::ballot::{Ballot, VOTERS_MAX};
 use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::effect::Effect;
 use crate::core::evaluation::{Audit, PendingEvaluation};
@@ -53,6 +55,32 @@ fn begin(turn: &mut Turn, id: JobId, setup: SetupKey) -> bool {
     };
     turn.state.proofs.begin(setup, (input, realizations), turn.now);
     true
+}
+
+/// Has all workers prove themselves by one realization of an evaluation about which hosts differ.
+pub(crate) fn replace(turn: &mut Turn, (id, point): (JobId, Point), index: u64, votes: &Ballot) {
+    let attempt = turn.state.new_attempt();
+    let known = turn.state.jobs.get(&id).filter(|_| turn.state.config.proofs);
+    let Some(setup) = known.map(|job| job.setup) else {
+        return;
+    };
+    let Some(input) = turn.state.input(id, attempt, point) else {
+        return;
+    };
+    let out = turn.state.proofs.of(&setup).map(|proofs| proofs.out.clone()).unwrap_or_default();
+    for batch in out.into_values() {
+        batches::revoke(turn, batch);
+    }
+    turn.state.proofs.replace(setup, (input, votes.about(index)), turn.now);
+    let mut waiting = Vec::new();
+    for (worker, attached) in &mut turn.state.workers {
+        attached.proven.remove(&setup);
+        if !attached.early.is_empty() {
+            waiting.push(*worker);
+        }
+    }
+    // Their answers wait for it.
+    waiting.into_iter().for_each(|worker| ask(turn, worker, id));
 }
 
 /// Asks hosts that have not voted, until so many have, or are asked.
@@ -145,8 +173,11 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
     let state = &*turn.state;
     let voters = voters(state, &setup, turn.now);
     let names = evaluation.workers.iter().enumerate();
-    let needs: Vec<(usize, Need)> =
-        names.map(|(place, name)| (place, need(state, (evaluation, place), name, (&setup, voters), turn.now))).collect();
+    let needs: Vec<(usize, Need)> = names
+        .map(|(place, name)| {
+            (place, need(state, (evaluation, place), name, (&setup, voters), turn.now))
+        })
+        .collect();
     let mut is_cleared = true;
     let mut audited = Vec::new();
     for (place, need) in needs {
@@ -157,27 +188,44 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
             Need::Audit => audited.push(place),
         }
     }
-    let fraction = turn.state.config.audit_fraction;
-    let key = turn.state.config.audit_key;
-    let Some(evaluation) = turn.state.jobs.get_mut(&id).and_then(|job| of_attempt_mut(job, attempt)) else {
+    let Some(job) = turn.state.jobs.get_mut(&id) else {
+        return;
+    };
+    let Some(evaluation) = of_attempt_mut(job, attempt) else {
         return;
     };
     for place in audited {
         audit_last(evaluation, place, None);
     }
-    if !is_cleared {
+    if is_cleared {
+        evaluation.is_cleared = true;
+        audit_last_answers(turn, id, attempt);
+    }
+}
+
+/// Queues an audit of one realization of the last answer of each worker, so that a machine that has broken
+/// meanwhile is found before the evaluation counts. Where that were more than the fraction of the realizations
+/// that is audited, as with many workers, it is found by its next audit.
+fn audit_last_answers(turn: &mut Turn, id: JobId, attempt: u64) {
+    let (key, fraction) = (turn.state.config.audit_key, turn.state.config.audit_fraction);
+    let state = &*turn.state;
+    let Some(evaluation) = state.jobs.get(&id).and_then(|job| of_attempt(job, attempt)) else {
+        return;
+    };
+    if evaluation.workers.len() as f64 > fraction * evaluation.realizations() as f64 {
         return;
     }
-    evaluation.is_cleared = true;
-    let affordable = fraction * evaluation.realizations() as f64;
-    if evaluation.workers.len() as f64 <= affordable {
-        (0..evaluation.workers.len()).for_each(|place| audit_last(evaluation, place, Some(&key)));
-    }
-    let audits = std::mem::take(&mut evaluation.audits);
-    let checked: Vec<Audit> =
-        audits.into_iter().filter(|audit| turn.state.can_check(audit.by.host())).collect();
-    if let Some(evaluation) = turn.state.jobs.get_mut(&id).and_then(|job| of_attempt_mut(job, attempt)) {
-        evaluation.audits = checked.into();
+    let workers = evaluation.workers.iter().enumerate();
+    let due = workers.filter(|(place, name)| {
+        !evaluation.vouched.contains(place) && state.can_check(name.host())
+    });
+    let due: Vec<(usize, WorkerName)> = due.map(|(place, name)| (place, name.clone())).collect();
+    for (place, name) in due {
+        let job = turn.state.jobs.get_mut(&id);
+        if let Some(evaluation) = job.and_then(|job| of_attempt_mut(job, attempt)) {
+            audit_last(evaluation, place, Some(&key));
+            turn.state.count_checked(&name, 1);
+        }
     }
 }
 
@@ -223,7 +271,9 @@ fn audit_last(evaluation: &mut PendingEvaluation, place: usize, one: Option<&aud
     if !evaluation.vouched.insert(place) {
         return;
     }
-    let (Some(last), Some(by)) = (evaluation.last_answers.get(place), evaluation.workers.get(place)) else {
+    let (Some(last), Some(by)) =
+        (evaluation.last_answers.get(place), evaluation.workers.get(place))
+    else {
         return;
     };
     let indices = one.map_or(*last, |key| audit::choose_one(key, evaluation.attempt, *last));
@@ -239,7 +289,8 @@ pub(crate) fn tick(turn: &mut Turn) -> Vec<SetupKey> {
         let Some(proofs) = turn.state.proofs.of(&setup) else {
             continue;
         };
-        let late = |(_, batch): &(&WorkerId, &BatchId)| overdue::is_overdue(turn.state, **batch, turn.now);
+        let late =
+            |(_, batch): &(&WorkerId, &BatchId)| overdue::is_overdue(turn.state, **batch, turn.now);
         let names = proofs.out.iter().filter(late).filter_map(|(worker, batch)| {
             let sent = turn.state.batches.get(batch)?.sent;
             Some((turn.state.workers.get(worker)?.name.clone(), sent))
@@ -273,9 +324,11 @@ fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) -> bool {
     if voted < 2 || voters > voted || lacks == 0 {
         return false;
     }
-    let job = turn.state.active.iter().find(|id| {
-        turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup)
-    });
+    let job = turn
+        .state
+        .active
+        .iter()
+        .find(|id| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup));
     let Some(job) = job.copied() else {
         return false;
     };

@@ -41,7 +41,7 @@ pub(crate) fn audit(state: &mut State, worker: WorkerId, batch: BatchId, assignm
     let slots = attached.hello.slots;
     let (chosen, left) =
         audit::choose((&key, fraction), (batch, slots), assignment.indices, attached.until_audit);
-    attached.until_audit = Some(left);
+    attached.until_audit = left;
     let by = attached.name.clone();
     if let Some(indices) = chosen
         && let Some(evaluation) = state.evaluation_of_mut(assignment)
@@ -126,8 +126,11 @@ pub(crate) fn proven(
     let Some(proofs) = turn.state.proofs.of_mut(&setup) else {
         return;
     };
+    let count = proofs.indices().count;
     proofs.give(by);
-    match proofs.ballot.cast(Vote { by: by.clone(), solved }) {
+    let cast = proofs.ballot.cast(Vote { by: by.clone(), solved });
+    turn.state.count_checked(by, count);
+    match cast {
         Cast::Counted => decide_proofs(turn, &setup),
         Cast::Contradicts(found) => contradicts_itself(turn, assignment.job, by, *found),
     }
@@ -180,16 +183,23 @@ fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
     let Some(dispute) = found.and_then(|evaluation| evaluation.disputes.get(at)) else {
         return;
     };
-    let Some(verdict) = dispute.ballot.verdict(audits::voters(turn.state, dispute, Some(turn.now))) else {
+    let Some(verdict) = dispute.ballot.verdict(audits::voters(turn.state, dispute, Some(turn.now)))
+    else {
         return;
     };
     let Some(job_) = turn.state.jobs.get_mut(&job) else {
         return;
     };
-    let evaluation = job_.evaluations_mut().find(|it| it.attempt == attempt);
-    let needless = evaluation.map(|evaluation| evaluation.disputes.remove(at).tie_breakers);
-    for tie_breaker in needless.unwrap_or_default() {
+    let Some(evaluation) = job_.evaluations_mut().find(|it| it.attempt == attempt) else {
+        return;
+    };
+    let (point, Dispute { ballot, tie_breakers, .. }) =
+        (evaluation.point, evaluation.disputes.remove(at));
+    for tie_breaker in tie_breakers {
         batches::revoke(turn, tie_breaker);
+    }
+    if let Some(found) = verdict.outvoted.first() {
+        proofs::replace(turn, (job, point), found.index, &ballot);
     }
     ban_outvoted(turn, job, verdict);
 }
@@ -198,7 +208,8 @@ fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
 fn ban_outvoted(turn: &mut Turn, job: JobId, verdict: Verdict) {
     let Verdict { agreeing, outvoted } = verdict;
     let (first, others) = agreeing.split_at(agreeing.len().min(HOSTS_SHOWN_MAX));
-    let further = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
+    let further =
+        if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
     for Contradiction { index, answers: [(_, right), (worker, wrong)], .. } in outvoted {
         let reason = format!(
             "answered realization {index} of job {job} with {}, while {}{further} agree on {}",
@@ -232,7 +243,12 @@ pub(crate) fn give_up(turn: &mut Turn) {
         for attempt in give_up_audits(turn.state, job) {
             jobs::settle(turn, job, attempt);
         }
-        if let Some(failure) = undecided(turn.state, job, turn.now) {
+        if let Some((failure, ballot)) = undecided(turn.state, job, turn.now) {
+            if let Some((RunFailure::Contradiction { contradiction, point }, ballot)) =
+                Some(&failure).zip(ballot)
+            {
+                proofs::replace(turn, (job, *point), contradiction.index, &ballot);
+            }
             jobs::fail(turn, job, &failure);
         }
     }
@@ -258,16 +274,18 @@ fn give_up_audits(state: &mut State, id: JobId) -> Vec<u64> {
 }
 
 /// Returns the failure of a job with a dispute that cannot be decided, or with workers whose proofs
-/// contradict each other, if there is one.
-fn undecided(state: &State, job: JobId, now: Duration) -> Option<RunFailure> {
+/// contradict each other, if there is one, with the votes of the dispute.
+fn undecided(state: &State, job: JobId, now: Duration) -> Option<(RunFailure, Option<Ballot>)> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let setup = state.jobs.get(&job)?.setup;
     if let Some(proofs) = state.proofs.of(&setup)
         && let Some(since) = proofs.undecided_since
-        && now.saturating_sub(since) > state.config.expiry * if proofs.out.is_empty() { 1 } else { 2 }
+        && now.saturating_sub(since)
+            > state.config.expiry * if proofs.out.is_empty() { 1 } else { 2 }
     {
         let contradiction = Box::new(proofs.ballot.contradiction()?);
-        return Some(RunFailure::Contradiction { contradiction, point: proofs.point() });
+        let point = proofs.point();
+        return Some((RunFailure::Contradiction { contradiction, point }, None));
     }
     let hopeless = |dispute: &&Dispute| {
         let patient = now.saturating_sub(dispute.since) <= state.config.expiry;
@@ -279,5 +297,6 @@ fn undecided(state: &State, job: JobId, now: Duration) -> Option<RunFailure> {
     };
     let dispute = evaluation.disputes.iter().find(hopeless)?;
     let contradiction = Box::new(dispute.ballot.contradiction()?);
-    Some(RunFailure::Contradiction { contradiction, point: evaluation.point })
+    let point = evaluation.point;
+    Some((RunFailure::Contradiction { contradiction, point }, Some(dispute.ballot.clone())))
 }

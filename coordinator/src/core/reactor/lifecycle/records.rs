@@ -201,7 +201,15 @@ fn on_end_stored(turn: &mut Turn, id: JobId) {
     let Some(job) = turn.state.jobs.remove(&id) else {
         return;
     };
-    let Job { record, stage: Stage::StoringEnd(end), pending_replies, sequence, mut doubts, search, .. } = job
+    let Job {
+        record,
+        stage: Stage::StoringEnd(end),
+        pending_replies,
+        sequence,
+        mut doubts,
+        search,
+        ..
+    } = job
     else {
         return;
     };

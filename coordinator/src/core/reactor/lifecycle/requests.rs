@@ -198,9 +198,7 @@ fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
 /// Lifts the ban of a host.
 fn unban(turn: &mut Turn, host: &str) -> Answer {
     let now = turn.now;
-    let is_of = |it: &&mut Banned| {
-        it.record.lifted.is_none() && it.record.worker.host() == host
-    };
+    let is_of = |it: &&mut Banned| it.record.lifted.is_none() && it.record.worker.host() == host;
     let Some(banned) = turn.state.banned.iter_mut().find(is_of) else {
         return Answer::Refused(Refusal::NotBanned { host: host.to_owned() });
     };

@@ -114,8 +114,15 @@ impl State {
     /// Returns a coordinator that continues with `restored`, as of `now`, and its first effects.
     pub fn restore(config: Config, restored: Restored, now: Duration) -> (Self, Vec<Effect>) {
         let mut state = Self::new(config, now);
-        let Restored { ended, unfinished, mut parts, banned, doubts, mut digests, last_deleted_job } =
-            restored;
+        let Restored {
+            ended,
+            unfinished,
+            mut parts,
+            banned,
+            doubts,
+            mut digests,
+            last_deleted_job,
+        } = restored;
         let mut doubts_of: BTreeMap<JobId, Doubts> = BTreeMap::new();
         for doubt in doubts {
             let of = doubts_of.entry(doubt.job).or_default();

@@ -95,7 +95,9 @@ fn workers_of_one_host_do_not_check_each_other() {
     let effects = rig.event(answer(5, 3, 0, 1));
     assert!(effects[0].starts_with("store ban 1: node-1 (process 1)"), "{effects:?}");
     // Both processes of the banned host are sent away, and others are refused.
-    let closed = |worker: u64| effects.iter().any(|it| it.starts_with(&format!("close {worker}: host node-1")));
+    let closed = |worker: u64| {
+        effects.iter().any(|it| it.starts_with(&format!("close {worker}: host node-1")))
+    };
     assert_eq!([1, 2, 5, 9].map(closed), [true, true, false, false], "{effects:?}");
     let refused = rig.event(of_host(7, 7));
     assert!(refused[0].starts_with("close 7: host node-1 is banned"), "{refused:?}");
@@ -115,7 +117,10 @@ fn a_ban_lasts_until_it_is_lifted() {
     assert_eq!(effects.last().map(String::as_str), Some("answer 8: lifted node-1"));
     assert!(effects[0].starts_with("store ban 1: node-1"), "{effects:?}");
     rig.event(stored(1, RecordKey::Ban(1)));
-    rig.check(unban("node-1"), &["answer 8: host `node-1` is not banned; `osteon workers` lists those that are"]);
+    rig.check(
+        unban("node-1"),
+        &["answer 8: host `node-1` is not banned; `osteon workers` lists those that are"],
+    );
     let effects = rig.event(hello_of(9, 1, 1));
     assert_eq!(effects[0], "welcome 9, lease 4");
     // Its answers in jobs that were accepted before remain doubtful.
@@ -231,7 +236,10 @@ fn of_two_workers_none_is_believed() {
     let reason = &effects[0];
     let expected = "store job 1 end: failed integrity error: realization 0 at the point";
     assert!(reason.starts_with(expected), "{reason}");
-    for part in ["by node-1 (process 1) and 3900.0000000000005 m/s", "hosts node-1, node-2 give no majority"] {
+    for part in [
+        "by node-1 (process 1) and 3900.0000000000005 m/s",
+        "hosts node-1, node-2 give no majority",
+    ] {
         assert!(reason.contains(part), "{reason}");
     }
 }

@@ -140,6 +140,7 @@ fn each_of_many_workers_is_tried_with_one_batch() {
 #[test]
 fn a_job_on_many_workers_begins_with_few_batches_of_unknown_duration() {
     let mut rig = Rig::new();
+    rig.state.config.audit_fraction = 0.0;
     for worker in 1..=600 {
         rig.event(hello_of(worker, worker as u32, 2));
     }

@@ -104,7 +104,14 @@ fn answers_of_a_banned_worker_are_not_used() {
     stored_parts(&mut rig, &mut store, Event::Drain);
     let worker = WorkerName::new("one", 1, 0);
     let reason = "lies".to_owned();
-    let ban = BanRecord { number: 1, worker: worker.clone(), job: JobId(1), reason, at: rig.now, lifted: None };
+    let ban = BanRecord {
+        number: 1,
+        worker: worker.clone(),
+        job: JobId(1),
+        reason,
+        at: rig.now,
+        lifted: None,
+    };
     // Banned after the restart.
     let mut after = restarted(&rig, &mut store);
     assert_eq!(filled(&after), answered);

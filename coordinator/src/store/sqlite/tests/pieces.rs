@@ -1,6 +1,8 @@
 //! Large evaluations, whose outcomes are in several rows.
 
-use super::super::columns::{evaluation_checksum, pack_errors, pack_outcomes, pack_point, pack_workers};
+use super::super::columns::{
+    evaluation_checksum, pack_errors, pack_outcomes, pack_point, pack_workers,
+};
 use super::super::opening::FORMAT;
 use super::*;
 use crate::store::{PIECE_OUTCOMES, PieceRecord};
