@@ -92,6 +92,8 @@ pub(crate) enum Command {
     Cancel(JobArguments),
     /// Write the results of an ended job to a directory
     Fetch(FetchArguments),
+    /// Compute an ended job again without a host that was banned later, and print whether a bit has changed
+    Recheck(WatchArguments),
     /// Create a certificate authority and certificates for coordinator, workers and clients
     Certs(CertsArguments),
     /// Create an access token and its entry for the coordinator's token list

@@ -83,6 +83,14 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
         Resolved::Explain { job, coordinator, format } => {
             unless_interrupted(jobs::explain(&job, &coordinator, format), NOTHING_LEFT).await
         }
+        Resolved::Recheck { job, coordinator, format } => {
+            let left = "the job may be computed again (see `osteon jobs`)";
+            unless_interrupted(jobs::recheck(&job, &coordinator, format), left).await
+        }
+        Resolved::Unban { host, coordinator } => {
+            let left = "the ban may have been lifted (see `osteon workers`)";
+            unless_interrupted(operators::unban(&host, &coordinator), left).await
+        }
         Resolved::Cancel { job, coordinator } => {
             let left = "the job may have been cancelled (see `osteon jobs`)";
             unless_interrupted(jobs::cancel(&job, &coordinator), left).await

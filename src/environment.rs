@@ -16,6 +16,8 @@ const TLS_CA: &str = "OSTEON_TLS_CA";
 const TLS_CERT: &str = "OSTEON_TLS_CERT";
 const TLS_KEY: &str = "OSTEON_TLS_KEY";
 const TOKEN_FILE: &str = "OSTEON_TOKEN_FILE";
+/// The variable with the name of a worker's machine.
+const HOST: &str = "OSTEON_HOST";
 
 /// The variables that name credential files.
 pub(crate) const FILES: [&str; 4] = [TLS_CA, TLS_CERT, TLS_KEY, TOKEN_FILE];
@@ -24,6 +26,7 @@ pub(crate) const FILES: [&str; 4] = [TLS_CA, TLS_CERT, TLS_KEY, TOKEN_FILE];
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Environment {
     coordinator: Option<String>,
+    host: Option<String>,
     files: CredentialFiles,
 }
 
@@ -31,7 +34,7 @@ impl Environment {
     /// Reads the variables of this process.
     ///
     /// # Errors
-    /// If the coordinator's address is not valid Unicode.
+    /// If the coordinator's address or the name of the machine is not valid Unicode.
     pub(crate) fn from_process() -> Result<Self, CommandFailure> {
         Self::read(|name| std::env::var_os(name))
     }
@@ -45,11 +48,14 @@ impl Environment {
     ) -> Result<Self, CommandFailure> {
         let given = |name| variable(name).filter(|value| !value.is_empty());
         let file = |name| given(name).map(PathBuf::from);
-        let coordinator = given(COORDINATOR).map(OsString::into_string).transpose();
+        let text = |name| {
+            given(name).map(OsString::into_string).transpose().map_err(|value| {
+                CommandFailure::bad_input(anyhow!("in {name}: {value:?} is not valid UTF-8"))
+            })
+        };
         Ok(Self {
-            coordinator: coordinator.map_err(|value| {
-                CommandFailure::bad_input(anyhow!("in {COORDINATOR}: {value:?} is not valid UTF-8"))
-            })?,
+            coordinator: text(COORDINATOR)?,
+            host: text(HOST)?,
             files: CredentialFiles {
                 ca: file(TLS_CA),
                 certificate: file(TLS_CERT),
@@ -57,6 +63,11 @@ impl Environment {
                 token: file(TOKEN_FILE),
             },
         })
+    }
+
+    /// Returns the name of a worker's machine, if there is one.
+    pub(crate) fn host(&self) -> Option<String> {
+        self.host.clone()
     }
 
     /// Returns the coordinator named in the environment, if there is one.

@@ -13,6 +13,10 @@ pub(crate) enum ExitStatus {
     RunFailed,
 }
 
+/// Exit code of a worker whose machine computes wrongly (EX_NOPERM of sysexits.h): service managers are told not
+/// to start it again.
+pub(crate) const BAD_MACHINE: u8 = 77;
+
 /// Reason why a command did not run to its end.
 #[derive(Debug)]
 pub(crate) enum CommandFailure {
@@ -20,6 +24,9 @@ pub(crate) enum CommandFailure {
     BadInput(anyhow::Error),
     /// Any other error. Exit code 1.
     Failed(anyhow::Error),
+    /// This machine computes wrongly, or is banned for wrong answers: it must be repaired before the command is
+    /// run again. Exit code 77.
+    BadMachine(anyhow::Error),
     /// A signal ended the command; the text says what happens to the work begun. Exit code 130 or
     /// 143.
     Interrupted(Interruption, &'static str),
@@ -82,6 +89,7 @@ impl CommandFailure {
             Self::Interrupted(interruption, _) => interruption.exit_code(),
             Self::BadInput(_) => 2,
             Self::Failed(_) => 1,
+            Self::BadMachine(_) => BAD_MACHINE,
             Self::ClosedPipe => 0,
         }
     }
@@ -90,7 +98,7 @@ impl CommandFailure {
 impl fmt::Display for CommandFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::BadInput(error) | Self::Failed(error) => {
+            Self::BadInput(error) | Self::Failed(error) | Self::BadMachine(error) => {
                 write!(f, "{error}")?;
                 // Append only the causes that the message does not contain already.
                 let mut told = error.to_string();

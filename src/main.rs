@@ -1,7 +1,8 @@
 //! The command line of osteon: parses arguments, calls the other crates, prints results.
 //!
 //! Results go to stdout through [`output`], everything else to stderr. Exit codes: 0 done, 1 the
-//! run failed or was cancelled, 2 bad usage or bad input, 130 and 143 ended by SIGINT and SIGTERM.
+//! run failed or was cancelled, 2 bad usage or bad input, 77 this machine computes wrongly, 130 and 143 ended by
+//! SIGINT and SIGTERM.
 
 mod arguments;
 mod certificates;

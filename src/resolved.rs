@@ -210,6 +210,22 @@ pub(crate) enum Resolved {
         /// Output format.
         format: OutputFormat,
     },
+    /// `recheck`.
+    Recheck {
+        /// Id of the job.
+        job: String,
+        /// The coordinator.
+        coordinator: Remote,
+        /// Output format.
+        format: OutputFormat,
+    },
+    /// `workers unban`.
+    Unban {
+        /// The host.
+        host: String,
+        /// The coordinator.
+        coordinator: Remote,
+    },
     /// `cancel`.
     Cancel {
         /// Id of the job.
@@ -332,6 +348,7 @@ impl Resolved {
             Command::Watch(arguments) => client::watch(arguments, remote)?,
             Command::Explain(arguments) => client::explain(arguments, remote)?,
             Command::Cancel(arguments) => client::cancel(arguments, remote)?,
+            Command::Recheck(arguments) => client::recheck(arguments, remote)?,
             Command::Fetch(arguments) => client::fetch(arguments, remote)?,
         })
     }
@@ -449,6 +466,7 @@ fn resolve_worker(
         spans: None,
         endpoint,
         credentials: Credentials::default(),
+        host: arguments.host.or_else(|| environment.host()),
         threads: arguments.threads.unwrap_or(cores),
         isa,
         give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),

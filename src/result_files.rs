@@ -6,6 +6,7 @@ use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::Path;
 
 use anyhow::Context as _;
+use osteon_files::report::IntegrityReport;
 use osteon_common::version::{Program, RESULT_SCHEMA};
 use osteon_common::visible;
 use osteon_files::user_file;
@@ -26,6 +27,8 @@ pub(crate) struct ResultOrigin<'a> {
     pub(crate) digest: Option<&'a str>,
     /// Seed of the germs, if any were drawn.
     pub(crate) seed: Option<u64>,
+    /// What was found out later about the hosts that computed it.
+    pub(crate) integrity: Option<&'a IntegrityReport>,
 }
 
 /// Writer of the files of a directory, one after another.
@@ -66,7 +69,7 @@ impl<'a> ResultFiles<'a> {
         hash.update(result.as_bytes());
         self.note(RESULT, &hash);
         let Program { version, numerics, commit } = origin.program;
-        let provenance = json!({
+        let mut provenance = json!({
             "schema": RESULT_SCHEMA,
             "kind": origin.kind,
             "program": "osteon",
@@ -77,6 +80,9 @@ impl<'a> ResultFiles<'a> {
             "seed": origin.seed,
             "files": self.written,
         });
+        if let Some(integrity) = origin.integrity {
+            provenance["integrity"] = json!(integrity);
+        }
         write(&self.directory.join(PROVENANCE), &format!("{provenance:#}\n"))?;
         write(&self.directory.join(RESULT), result)
     }

@@ -209,7 +209,13 @@ impl ResultsDirectory {
             let (digest, seed) = (Some(digest.as_str()), Some(*seed));
             files.finish(
                 &written.to_json(),
-                &ResultOrigin { kind: kind.name(), program, digest, seed },
+                &ResultOrigin {
+                    kind: kind.name(),
+                    program,
+                    digest,
+                    seed,
+                    integrity: written.integrity(),
+                },
             )
         };
         write_all().map_err(CommandFailure::Failed)?;

@@ -101,7 +101,13 @@ impl SimulationKey<'_> {
         self.refuse_other(directory)?;
         let program = program::current();
         let origin =
-            ResultOrigin { kind: "simulation", program: &program, digest: None, seed: None };
+            ResultOrigin {
+                kind: "simulation",
+                program: &program,
+                digest: None,
+                seed: None,
+                integrity: None,
+            };
         let write = || {
             let mut files = ResultFiles::begin(directory)?;
             files.write(CASE, &self.text())?;

@@ -7,6 +7,7 @@
 mod conclusions;
 mod error;
 mod identification;
+mod integrity;
 mod moments;
 mod point;
 mod posterior;
@@ -28,6 +29,7 @@ pub use self::conclusions::{
 };
 pub use self::error::{BestPointError, ReadError, listed};
 pub use self::identification::{Group, Identification, SearchSettings};
+pub use self::integrity::IntegrityReport;
 pub use self::moments::{Data, Moment, MomentIntervals, MomentSlopes, Moments, Velocity};
 pub use self::point::MeanModel;
 pub use self::posterior::{PosteriorReport, QuantityPosterior};
@@ -109,6 +111,14 @@ impl ResultFile {
         match self {
             Self::Identification(result) => &result.digest,
             Self::Propagation(result) => &result.digest,
+        }
+    }
+
+    /// What was found out later about the hosts that computed it; `None` if nothing was.
+    pub fn integrity(&self) -> Option<&IntegrityReport> {
+        match self {
+            Self::Identification(result) => result.integrity.as_ref(),
+            Self::Propagation(result) => result.integrity.as_ref(),
         }
     }
 

@@ -1,5 +1,6 @@
 //! Refusals as gRPC statuses with the details of `google.rpc`, and violations back from a status.
 
+use std::collections::HashMap;
 use std::time::Duration;
 
 use osteon_common::violations::Violations;
@@ -41,6 +42,23 @@ pub fn resource_exhausted(message: impl Into<String>, retry: Duration) -> Status
 pub fn unavailable(message: impl Into<String>, retry: Duration) -> Status {
     let details = ErrorDetails::with_retry_info(Some(retry));
     Status::with_error_details(Code::Unavailable, message, details)
+}
+
+/// Reason in a `google.rpc.ErrorInfo` of the status of a banned worker.
+const BANNED: &str = "BANNED";
+/// Domain of the reasons.
+const DOMAIN: &str = "osteon";
+
+/// Returns `PERMISSION_DENIED` with a `google.rpc.ErrorInfo`: the host of this worker is banned for wrong
+/// answers, and trying again changes nothing.
+pub fn banned(message: impl Into<String>) -> Status {
+    let details = ErrorDetails::with_error_info(BANNED, DOMAIN, HashMap::new());
+    Status::with_error_details(Code::PermissionDenied, message, details)
+}
+
+/// Returns whether [`banned`] made a status.
+pub fn is_banned(status: &Status) -> bool {
+    status.get_details_error_info().is_some_and(|it| it.domain == DOMAIN && it.reason == BANNED)
 }
 
 /// Returns the time to wait before a refused request is tried again, if its status carries one.

@@ -25,11 +25,24 @@ pub(crate) struct WorkersArguments {
 pub(crate) enum WorkersCommand {
     /// Drain a worker: it receives no new batches, completes or returns those it holds, and exits
     Drain(DrainArguments),
+    /// Lift the ban of a host whose machine has been repaired, so that its workers may attach again
+    Unban(UnbanArguments),
     /// Submit workers to Slurm as long as jobs wait for them, until interrupted
     ///
     /// Workers end by themselves when they have had no work for the idle timeout. Those that wait in
     /// Slurm's queue while there is no work are cancelled after the same time.
     Slurm(Box<ScalingArguments>),
+}
+
+/// Arguments of `workers unban`.
+#[derive(Debug, Args)]
+pub(crate) struct UnbanArguments {
+    /// The host, as `osteon workers` lists it
+    #[arg(value_name = "HOST")]
+    pub(crate) host: String,
+    /// The coordinator.
+    #[command(flatten)]
+    pub(crate) client: ClientArguments,
 }
 
 /// Arguments of `workers drain`.

@@ -92,6 +92,10 @@ pub(crate) struct WorkerArguments {
     /// Credentials for the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
+    /// Name of the machine: all its workers have one vote, and are banned together [env: OSTEON_HOST]
+    /// [default: the host name]
+    #[arg(long, value_name = "NAME", value_parser = clap::builder::NonEmptyStringValueParser::new())]
+    pub(crate) host: Option<String>,
     /// Number of threads to compute on [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,

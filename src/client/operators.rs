@@ -28,6 +28,13 @@ impl Client {
         self.peer.answered(call).await
     }
 
+    /// Lifts the ban of a host; returns the worker that had been found to compute wrongly.
+    pub(crate) async fn unban(&mut self, host: &str) -> Result<v1::BannedWorker, ClientError> {
+        let call = self.jobs.lift_ban(v1::LiftBanRequest { host: host.to_owned() });
+        let worker = self.peer.answered(call).await?.worker;
+        self.present(worker, "worker")
+    }
+
     /// Drains a worker; returns its state afterwards.
     pub(crate) async fn drain(&mut self, worker: u64) -> Result<WorkerSnapshot, ClientError> {
         let call = self.jobs.drain_worker(v1::DrainWorkerRequest { worker });

@@ -120,6 +120,8 @@ fn hint(status: &Status) -> &'static str {
     match status::missing(status) {
         Some(Resource::Job) => "; `osteon jobs` lists all jobs",
         Some(Resource::Worker) => "; `osteon workers` lists all that are attached",
+        // The refusal says it.
+        Some(Resource::Host) => "",
         None => "",
     }
 }

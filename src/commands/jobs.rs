@@ -99,6 +99,17 @@ pub(super) async fn watch(
     Ok(exit_status(&last))
 }
 
+/// `recheck`: computes a job again that a banned host contributed to, and follows it to its end, which says
+/// whether its result has changed.
+pub(super) async fn recheck(
+    job: &str,
+    coordinator: &Remote,
+    format: OutputFormat,
+) -> Result<ExitStatus, CommandFailure> {
+    Client::connect(coordinator).await?.recheck(job).await?;
+    watch(job, coordinator, format).await
+}
+
 /// `explain`: prints what decides how fast a job is.
 pub(super) async fn explain(
     job: &str,
@@ -157,7 +168,12 @@ fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, 
     let new = ResultFile::from_job(specification.kind, &fetched.result);
     // The digest covers everything that was computed; the program's version may differ.
     if (stored.status(), stored.digest()) == (new.status(), new.digest()) {
-        return Ok(false);
+        return Ok(new.integrity() != stored.integrity());
+    }
+    // It was computed again without a host that was banned.
+    let earlier = new.integrity().and_then(|it| it.earlier_digest.as_deref());
+    if earlier == Some(stored.digest()) {
+        return Ok(true);
     }
     let failed = result_status::exit_status(specification, stored) == ExitStatus::RunFailed;
     if failed && !result_status::is_cancelled(&new) || result_status::is_cancelled(stored) {

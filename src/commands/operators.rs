@@ -44,6 +44,17 @@ pub(super) async fn drain(
     Ok(ExitStatus::Done)
 }
 
+/// `workers unban`: prints the host whose ban is lifted.
+pub(super) async fn unban(
+    host: &str,
+    coordinator: &Remote,
+) -> Result<ExitStatus, CommandFailure> {
+    let worker = Client::connect(coordinator).await?.unban(host).await?;
+    let line = format!("{}\n", visible::line(&worker.host));
+    output::stdout(OutputFormat::Text).verbatim(&line).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
+}
+
 /// `health`: prints whether a coordinator is serving; the exit code is 0 if it is.
 pub(super) async fn health(
     coordinator: &Remote,

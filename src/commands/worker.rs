@@ -30,6 +30,9 @@ pub(super) async fn serve(
             error,
             WorkerError::Distrust { .. } | WorkerError::Refused { code: Code::Unauthenticated, .. }
         );
+        if error.is_about_the_machine() {
+            return CommandFailure::BadMachine(error.into());
+        }
         CommandFailure::Failed(noted(error.into(), of_trust, unused))
     })?;
     Ok(ExitStatus::Done)

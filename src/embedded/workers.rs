@@ -17,7 +17,7 @@ use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
 
 use crate::environment;
-use crate::exit_status::CommandFailure;
+use crate::exit_status::{BAD_MACHINE, CommandFailure};
 use crate::progress::say;
 
 /// Time after which a worker ends by itself if it has lost this process, s.
@@ -121,12 +121,17 @@ async fn keep(
 ) {
     let mut deaths = Deaths::default();
     loop {
+        let mut is_bad_machine = false;
         let (death, words) = match spawn(&shared.executable, &shared.endpoint, shared.threads) {
             Ok(mut child) => {
                 let words =
                     tokio::spawn(listen(number, child.stderr.take(), Arc::clone(&shared.muted)));
                 tokio::select! {
-                    status = child.wait() => (describe_death(status), last_words(words).await),
+                    status = child.wait() => {
+                        let code = status.as_ref().ok().and_then(ExitStatus::code);
+                        is_bad_machine = code == Some(BAD_MACHINE.into());
+                        (describe_death(status), last_words(words).await)
+                    }
                     _ = stopped.changed() => {
                         // Kills and reaps the process; it is not an error if it is already dead.
                         drop(child.kill().await);
@@ -137,6 +142,10 @@ async fn keep(
             Err(error) => (format!("cannot be started: {error:#}"), String::new()),
         };
         if shared.muted.load(Ordering::Relaxed) {
+            return;
+        }
+        if is_bad_machine {
+            drop(failures.try_send(anyhow!("worker {number} cannot compute here:{words}")));
             return;
         }
         let in_a_row = deaths.count(shared.progress.load(Ordering::Relaxed));

@@ -280,5 +280,6 @@ pub(crate) fn snapshot_value(snapshot: &JobSnapshot) -> Value {
         "workers": snapshot.workers,
         "elapsed_s": snapshot.elapsed_s,
         "waiting_for": text(&snapshot.waiting_for),
+        "integrity": text(&snapshot.integrity),
     })
 }

@@ -174,11 +174,12 @@ pub(super) fn status_name(snapshot: &JobSnapshot) -> Option<&'static str> {
     client::job_status(snapshot).map(osteon_common::results::Status::name)
 }
 
-/// Returns the progress of a job in this many columns; a reason is not shortened, however long it
-/// is.
+/// Returns the progress of a job in this many columns; a reason and what was found out about its hosts are not
+/// shortened, however long they are.
 fn progress(snapshot: &JobSnapshot, width: usize) -> String {
     // A case file may follow the first line of a reason.
     let reason = snapshot.reason.lines().next().unwrap_or_default();
-    let parts = [line(snapshot, &JobProgress::default(), width), reason.to_owned()];
+    let progress = line(snapshot, &JobProgress::default(), width);
+    let parts = [progress, reason.to_owned(), snapshot.integrity.clone()];
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }

@@ -70,6 +70,10 @@ pub(super) fn workers(
             coordinator: remote(drain.client.or(client))?,
             format: format(json || drain.json),
         },
+        Some(WorkersCommand::Unban(unban)) => Resolved::Unban {
+            host: unban.host,
+            coordinator: remote(unban.client.or(client))?,
+        },
         Some(WorkersCommand::Slurm(scaling)) => {
             let coordinator = remote(scaling.client.clone().or(client))?;
             slurm::scaling(*scaling, coordinator)?
@@ -118,6 +122,18 @@ pub(super) fn explain(
     Ok(Resolved::Explain {
         job: arguments.job,
         coordinator: remote(arguments.client)?,
+        format: format(arguments.json),
+    })
+}
+
+/// Resolves `recheck`.
+pub(super) fn recheck(
+    arguments: WatchArguments,
+    remote: impl FindCoordinator,
+) -> Result<Resolved, CommandFailure> {
+    Ok(Resolved::Recheck {
+        job: arguments.job.job,
+        coordinator: remote(arguments.job.client)?,
         format: format(arguments.json),
     })
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::self_test::KNOWN_DIGEST;
 use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::parameters::Point;
 use osteon_proto::endpoint::Endpoint;
@@ -43,6 +44,25 @@ pub enum WorkerError {
         code: Code,
         /// The coordinator's explanation.
         reason: String,
+    },
+    /// The host of this worker is banned for wrong answers.
+    #[error("the coordinator at {endpoint} rejected this worker: {reason}")]
+    Banned {
+        /// Address of the coordinator.
+        endpoint: Endpoint,
+        /// The coordinator's explanation.
+        reason: String,
+    },
+    /// This machine computes other bits than it should.
+    #[error(
+        "this machine computes wrongly: the digest of a known batch on {isa} is {found}, and must be \
+         {KNOWN_DIGEST}; run `osteon doctor`, test its memory and processor, and report this if they are sound"
+    )]
+    ComputesWrongly {
+        /// Name of the instruction set.
+        isa: &'static str,
+        /// The digest.
+        found: String,
     },
     /// Coordinator and worker do not trust each other's certificates, or cannot establish TLS.
     #[error("no trust between this worker and the coordinator at {endpoint}: {failure}")]
@@ -91,6 +111,13 @@ pub struct PanickedCase {
     pub germs: GermSource,
     /// The point (a, δ).
     pub point: Point,
+}
+
+impl WorkerError {
+    /// Returns whether the worker must not be started again before its machine is repaired.
+    pub fn is_about_the_machine(&self) -> bool {
+        matches!(self, Self::Banned { .. } | Self::ComputesWrongly { .. })
+    }
 }
 
 impl fmt::Display for PanickedCase {

@@ -11,7 +11,7 @@ use osteon_proto::credentials::Credentials;
 use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::identity;
 use osteon_proto::spans::SpanRecorder;
-use osteon_proto::status::retry_after;
+use osteon_proto::status::{is_banned, retry_after};
 use osteon_proto::tls_failure::TlsFailure;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::{AttachRequest, AttachResponse};
@@ -27,6 +27,7 @@ use crate::backoff::Backoff;
 use crate::batch_spans::BatchSpans;
 use crate::compute::Cores;
 use crate::error::WorkerError;
+use crate::self_test::{KNOWN_DIGEST, known_batch_digest};
 use crate::state::{BATCHES_HELD_MAX, Detached, Effect, Event, Failure, Identity, State};
 
 /// Longest wait for a connection, and for the answer to the hello, s.
@@ -43,6 +44,9 @@ pub struct WorkerConfig {
     pub endpoint: Endpoint,
     /// Certificates and token for the coordinator, and the authorities that are trusted.
     pub credentials: Credentials,
+    /// Name of the machine, by which its answers count as one vote, and by which it is banned; `None`: its host
+    /// name.
+    pub host: Option<String>,
     /// Number of threads to compute on, 1 to [`WORKER_THREADS_MAX`].
     pub threads: u32,
     /// Instruction set to compute on; results do not depend on it.
@@ -63,8 +67,8 @@ pub struct WorkerConfig {
 /// again.
 ///
 /// # Errors
-/// If the coordinator refuses the worker, is away for longer than allowed or sends a message that
-/// cannot be read, or if the solver panics.
+/// If this machine computes a known batch wrongly, the coordinator refuses the worker, is away for longer than
+/// allowed or sends a message that cannot be read, or if the solver panics.
 pub async fn run(
     config: WorkerConfig,
     shutdown: impl Future<Output = ()>,
@@ -91,7 +95,7 @@ async fn run_on(
     let (finished_sender, finished) = mpsc::channel(BATCHES_HELD_MAX);
     let identity = Identity {
         slots: backend.slots(),
-        host: host_name(),
+        host: host_name(config.host.as_deref()),
         process: std::process::id(),
         instance: identity::random_number()?,
     };
@@ -107,6 +111,7 @@ async fn run_on(
         endpoint: config.endpoint.clone(),
         credentials: config.credentials.clone(),
         spans: config.spans.clone().map(BatchSpans::new),
+        isa: config.isa,
     };
     let leave = async {
         match config.time_limit {
@@ -137,6 +142,8 @@ struct Worker {
     credentials: Credentials,
     /// Present if spans are recorded.
     spans: Option<BatchSpans>,
+    /// The instruction set on which the known batch is computed.
+    isa: Isa,
 }
 
 /// Outcome of an attachment.
@@ -157,6 +164,7 @@ impl Worker {
     ) -> Result<(), WorkerError> {
         let mut backoff = Backoff::default();
         loop {
+            self.check_machine().await?;
             let (last, stated) = match self.attachment(leave.as_mut(), &mut backoff).await? {
                 End::Left => return Ok(()),
                 End::Lost(reason) => (reason, None),
@@ -179,6 +187,18 @@ impl Worker {
                 return Ok(());
             }
         }
+    }
+
+    /// Computes a known batch before each attachment: a machine that computes wrongly must not attach.
+    async fn check_machine(&self) -> Result<(), WorkerError> {
+        let isa = self.isa;
+        let computed = tokio::task::spawn_blocking(move || known_batch_digest(isa)).await;
+        // A solver that panics here would at every batch.
+        let found = computed.ok().flatten().unwrap_or_else(|| "none".to_owned());
+        if found == KNOWN_DIGEST {
+            return Ok(());
+        }
+        Err(WorkerError::ComputesWrongly { isa: isa.name(), found })
     }
 
     /// Runs one attachment, from the connection to its end.
@@ -316,6 +336,9 @@ impl Worker {
             return self.on_tls_failure(failure);
         }
         let reason = self.endpoint.explained(status, self.ever_answered);
+        if is_banned(status) {
+            return Err(WorkerError::Banned { endpoint: self.endpoint.clone(), reason });
+        }
         match status.code() {
             Code::FailedPrecondition
             | Code::InvalidArgument
@@ -406,9 +429,10 @@ fn detached(why: Detached) -> &'static str {
     }
 }
 
-/// Returns the name of this host, for display only.
-fn host_name() -> String {
-    let name = identity::host_name().unwrap_or_else(|| "unknown".to_owned());
+/// Returns the name of this machine: as given, or its host name.
+fn host_name(given: Option<&str>) -> String {
+    let known = given.map(str::to_owned).or_else(identity::host_name);
+    let name = known.unwrap_or_else(|| "unknown".to_owned());
     name.chars().take(NAME_BYTES_MAX / 4).collect()
 }
 

@@ -86,6 +86,7 @@ pub(crate) fn job(snapshot: &JobSnapshot) -> Value {
         "best_coefficient_of_variation": snapshot.best_coefficient_of_variation,
         "elapsed_s": snapshot.elapsed_s.floor(),
         "waiting_for": snapshot.waiting_for,
+        "integrity": snapshot.integrity,
         "submit_time": unix_s!(snapshot.submit_time),
         "end_time": unix_s!(snapshot.end_time),
     })

@@ -6,7 +6,7 @@ use osteon_proto::announced::Announced;
 use osteon_proto::batch::{self, Work};
 use osteon_proto::evaluation::{self, EvaluationInput};
 use osteon_proto::spans::TraceContext;
-use osteon_proto::status::{resource_exhausted, unavailable};
+use osteon_proto::status::{banned, resource_exhausted, unavailable};
 use osteon_proto::v1;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::{AttachResponse, BatchRevoke, Heartbeat, WorkerDrain, WorkerWelcome};
@@ -147,7 +147,7 @@ pub(crate) fn status(reason: &CloseReason) -> Status {
         | CloseReason::WrongCount { .. }
         | CloseReason::ImpossibleVelocity { .. }
         | CloseReason::SecondHello => Code::InvalidArgument,
-        CloseReason::Banned { .. } => Code::PermissionDenied,
+        CloseReason::Banned { .. } => return banned(reason.to_string()),
         CloseReason::TooManyWorkers { .. } | CloseReason::AttachesTooOften { .. } => {
             return resource_exhausted(reason.to_string(), RETRY);
         }

@@ -13,10 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use super::conclusions::{Identified, ParameterProfile, Solutions, profiles, sensitivities};
 use super::schema::{keyed_by_failure, keyed_by_parameter};
-use super::{
-    Data, EstimatedErrors, MeanModel, MomentSlopes, PosteriorReport, Solver, Velocity,
-    absent_or_nullable, finite_or_null,
-};
+use super::{IntegrityReport, Data, EstimatedErrors, MeanModel, MomentSlopes, PosteriorReport, Solver, Velocity,
+    absent_or_nullable, finite_or_null,};
 
 /// The point that fits the data best, and what the data say of it. Where the data are groups, each
 /// group has its own point, and the keys of the best point are null.
@@ -119,6 +117,9 @@ pub struct Identification {
     /// The commit that the program was built from, with `-dirty` behind it if the sources were
     /// modified; null if it was built outside a repository.
     pub commit: Option<String>,
+    /// What was found out later about the hosts that computed it; only if something was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub integrity: Option<IntegrityReport>,
 }
 
 impl Identification {
@@ -180,6 +181,7 @@ impl From<&JobResult> for Identification {
             version: result.program.version.clone(),
             numerics: result.program.numerics,
             commit: result.program.commit.clone(),
+            integrity: IntegrityReport::of(result),
         }
     }
 }

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::schema::keyed_by_failure;
-use super::{EstimatedErrors, MeanModel, Solver, Velocity, finite_or_null};
+use super::{EstimatedErrors, IntegrityReport, MeanModel, Solver, Velocity, finite_or_null};
 
 /// The moments of the velocities at one point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -47,6 +47,9 @@ pub struct Propagation {
     /// The commit that the program was built from, with `-dirty` behind it if the sources were
     /// modified; null if it was built outside a repository.
     pub commit: Option<String>,
+    /// What was found out later about the hosts that computed it; only if something was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub integrity: Option<IntegrityReport>,
 }
 
 impl From<&JobResult> for Propagation {
@@ -70,6 +73,7 @@ impl From<&JobResult> for Propagation {
             version: result.program.version.clone(),
             numerics: result.program.numerics,
             commit: result.program.commit.clone(),
+            integrity: IntegrityReport::of(result),
         }
     }
 }

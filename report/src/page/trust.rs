@@ -50,9 +50,12 @@ pub(super) fn of_run(run: &ReportedRun, findings: &[Finding<'_>]) -> String {
         return list(&[one]);
     }
     if findings.len() > 1 || findings.iter().any(|finding| finding.group.is_some()) {
-        return of_groups(findings);
+        let hosts: Vec<Verdict> = hosts(run).into_iter().collect();
+        let above = if hosts.is_empty() { String::new() } else { list(&hosts) };
+        return above + &of_groups(findings);
     }
-    let verdicts: Vec<Verdict> = findings.iter().flat_map(of_finding).collect();
+    let of_findings = findings.iter().flat_map(of_finding);
+    let verdicts: Vec<Verdict> = hosts(run).into_iter().chain(of_findings).collect();
     list(&verdicts)
 }
 
@@ -129,6 +132,21 @@ fn of_finding(finding: &Finding<'_>) -> Vec<Verdict> {
     found.extend(few(finding));
     found.extend(solver(finding));
     found
+}
+
+/// What was found out later about the hosts that computed the result.
+fn hosts(run: &ReportedRun) -> Option<Verdict> {
+    let found = match &run.content {
+        RunContent::Identification(result, _) => result.integrity.as_ref()?,
+        RunContent::Propagation(result, _) => result.integrity.as_ref()?,
+        RunContent::Simulation(..) => return None,
+    };
+    let bearing = match found.changed {
+        None => Bearing::Bad,
+        Some(true) => Bearing::Caution,
+        Some(false) => Bearing::Good,
+    };
+    Some(verdict(bearing, "Hosts", format!("{}.", found.statement)))
 }
 
 fn status(finding: &Finding<'_>) -> Option<Verdict> {

@@ -39,6 +39,9 @@ pub(super) fn table(shown: &ShownResult<'_>) -> String {
         text.push_str(&details::text(shown.result));
     }
     text.push_str(&format!("\n{}", wrapped(&solver::line(solver))));
+    if let Some(integrity) = shown.result.integrity() {
+        text.push_str(&wrapped(&visible::line(&format!("Hosts: {}", integrity.statement))));
+    }
     text.push_str(&format!("\ndigest {}\n", visible::line(shown.result.digest())));
     text.push_str(&files(shown));
     text

@@ -258,6 +258,7 @@ fn config(scene: &Scene) -> WorkerConfig {
     WorkerConfig {
         endpoint,
         credentials: Credentials::default(),
+        host: None,
         threads: 1,
         isa: Isa::fastest(),
         give_up_after: None,

@@ -121,7 +121,7 @@ const showAlerts = ({ jobs: all, workers, store, mismatches }) => {
   const alerts = [];
   if (store.refusing_s > 0) alerts.push(["bad", "Store", `It has refused records for ${span(store.refusing_s)}; the log says why.`]);
   if (workers.count === 0 && all.running + all.waiting > 0) alerts.push(["caution", "Workers", "None is attached, so nothing is computed."]);
-  if (workers.banned > 0) alerts.push(["bad", "Banned", `${count(workers.banned, "worker", "workers")} gave wrong results and ${workers.banned === 1 ? "is" : "are"} refused.`]);
+  if (workers.banned > 0) alerts.push(["bad", "Banned", `${count(workers.banned, "host", "hosts")} gave wrong results and ${workers.banned === 1 ? "is" : "are"} refused until an operator lifts the ban (osteon workers unban).`]);
   if (workers.on_probation + workers.distrusted > 0) alerts.push(["caution", "Unreliable", `${count(workers.on_probation + workers.distrusted, "worker gets", "workers get")} little work: batches were lost or not answered.`]);
   if (mismatches > 0 && workers.banned === 0) alerts.push(["caution", "Answers", `${count(mismatches, "answer differs", "answers differ")} from that of another worker.`]);
   byId("alerts").hidden = alerts.length === 0;
@@ -206,7 +206,7 @@ const fillJobRow = (row, job) => {
   const [text, kind] = standing(job);
   put(state.firstChild, text);
   attribute(state.firstChild, "class", `state ${kind}`);
-  put(state.lastChild, job.waiting_for === "" ? "" : `waits for ${job.waiting_for}`);
+  put(state.lastChild, job.waiting_for === "" ? job.integrity : `waits for ${job.waiting_for}`);
   const single = job.kind === "propagation";
   const [done, all] = single ? [job.realizations_done, job.realizations] : [job.evaluations, job.max_evaluations];
   const bar = progress.firstChild.firstChild;
