@@ -6,9 +6,9 @@ use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::Path;
 
 use anyhow::Context as _;
-use osteon_files::report::IntegrityReport;
 use osteon_common::version::{Program, RESULT_SCHEMA};
 use osteon_common::visible;
+use osteon_files::report::IntegrityReport;
 use osteon_files::user_file;
 use serde_json::{Value, json};
 

@@ -100,14 +100,13 @@ impl SimulationKey<'_> {
         // Another process may have written between the first check and the lock.
         self.refuse_other(directory)?;
         let program = program::current();
-        let origin =
-            ResultOrigin {
-                kind: "simulation",
-                program: &program,
-                digest: None,
-                seed: None,
-                integrity: None,
-            };
+        let origin = ResultOrigin {
+            kind: "simulation",
+            program: &program,
+            digest: None,
+            seed: None,
+            integrity: None,
+        };
         let write = || {
             let mut files = ResultFiles::begin(directory)?;
             files.write(CASE, &self.text())?;

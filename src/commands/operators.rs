@@ -45,10 +45,7 @@ pub(super) async fn drain(
 }
 
 /// `workers unban`: prints the host whose ban is lifted.
-pub(super) async fn unban(
-    host: &str,
-    coordinator: &Remote,
-) -> Result<ExitStatus, CommandFailure> {
+pub(super) async fn unban(host: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
     let worker = Client::connect(coordinator).await?.unban(host).await?;
     let line = format!("{}\n", visible::line(&worker.host));
     output::stdout(OutputFormat::Text).verbatim(&line).map_err(stdout_failure)?;

@@ -70,10 +70,9 @@ pub(super) fn workers(
             coordinator: remote(drain.client.or(client))?,
             format: format(json || drain.json),
         },
-        Some(WorkersCommand::Unban(unban)) => Resolved::Unban {
-            host: unban.host,
-            coordinator: remote(unban.client.or(client))?,
-        },
+        Some(WorkersCommand::Unban(unban)) => {
+            Resolved::Unban { host: unban.host, coordinator: remote(unban.client.or(client))? }
+        }
         Some(WorkersCommand::Slurm(scaling)) => {
             let coordinator = remote(scaling.client.clone().or(client))?;
             slurm::scaling(*scaling, coordinator)?

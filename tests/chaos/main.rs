@@ -12,6 +12,8 @@
     reason = "a test that cannot go on fails, and says what it survived"
 )]
 
+#[path = "../support/altering.rs"]
+mod altering;
 #[path = "../support/api.rs"]
 mod api;
 #[path = "../support/peer.rs"]
@@ -27,6 +29,7 @@ mod service;
 mod support;
 
 mod answers;
+mod broken;
 mod clients;
 mod crowd;
 mod disk;

@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::support::{Owned, Scratch, eventually, osteon, text};
 
@@ -108,16 +109,24 @@ impl Service {
         batches.map(|batches| batches.parse::<usize>().unwrap()).sum()
     }
 
-    /// Attaches a worker with one thread.
+    /// Attaches a worker with one thread, as if on a machine of its own.
     pub(crate) fn worker(&self, scratch: &Scratch) -> Owned {
         worker(scratch, &self.url)
     }
 }
 
-/// Starts a worker with one thread for the coordinator at `url`; it logs to `workers.log`.
+/// Starts a worker with one thread for the coordinator at `url`, as if on a machine of its own; it logs to
+/// `workers.log`.
 pub(crate) fn worker(scratch: &Scratch, url: &str) -> Owned {
+    static MACHINES: AtomicU32 = AtomicU32::new(1);
+    worker_on(scratch, url, &format!("machine-{}", MACHINES.fetch_add(1, Ordering::Relaxed)))
+}
+
+/// As [`worker`], on the machine of this name.
+pub(crate) fn worker_on(scratch: &Scratch, url: &str, host: &str) -> Owned {
     let mut command = osteon();
-    command.args(["worker", "--coordinator", url, "--threads", "1"]).env("RUST_LOG", "info");
+    command.args(["worker", "--coordinator", url, "--threads", "1", "--host", host]);
+    command.env("RUST_LOG", "info");
     Owned::spawn_logging(&mut command, &scratch.path("workers.log"))
 }
 

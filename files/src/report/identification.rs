@@ -13,8 +13,10 @@ use serde::{Deserialize, Serialize};
 
 use super::conclusions::{Identified, ParameterProfile, Solutions, profiles, sensitivities};
 use super::schema::{keyed_by_failure, keyed_by_parameter};
-use super::{IntegrityReport, Data, EstimatedErrors, MeanModel, MomentSlopes, PosteriorReport, Solver, Velocity,
-    absent_or_nullable, finite_or_null,};
+use super::{
+    Data, EstimatedErrors, IntegrityReport, MeanModel, MomentSlopes, PosteriorReport, Solver,
+    Velocity, absent_or_nullable, finite_or_null,
+};
 
 /// The point that fits the data best, and what the data say of it. Where the data are groups, each
 /// group has its own point, and the keys of the best point are null.
