@@ -340,9 +340,9 @@ fn refused(refusal: &Refusal) -> Status {
             status::not_found(Resource::Worker, worker.to_string(), message)
         }
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
-        Refusal::TooManyJobs { .. } | Refusal::TooMuchQueued { .. } => {
-            status::resource_exhausted(message, RETRY)
-        }
+        Refusal::TooManyJobs { .. }
+        | Refusal::ClientHasTooManyJobs { .. }
+        | Refusal::TooMuchQueued { .. } => status::resource_exhausted(message, RETRY),
         Refusal::NotEnded { .. } => Status::failed_precondition(message),
         Refusal::Draining | Refusal::Store { .. } | Refusal::NotPruned { .. } => {
             Status::unavailable(message)
@@ -370,6 +370,11 @@ mod tests {
         let taken = Refusal::RequestIdTaken { request_id: "a".to_owned(), job };
         for (refusal, code, retry) in [
             (Refusal::TooManyJobs { limit: 5 }, Code::ResourceExhausted, Some(RETRY)),
+            (
+                Refusal::ClientHasTooManyJobs { client: "a".to_owned(), limit: 5, all: 20 },
+                Code::ResourceExhausted,
+                Some(RETRY),
+            ),
             (
                 Refusal::TooMuchQueued { whose: "all", held: 5, more: 2, limit: 6 },
                 Code::ResourceExhausted,

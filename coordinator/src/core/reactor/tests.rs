@@ -156,10 +156,19 @@ fn identification(realizations: u64) -> JobSpecification {
 }
 
 fn submit(reply_id: u64, request_id: &str, specification: JobSpecification) -> Event {
+    submit_of("", reply_id, request_id, specification)
+}
+
+fn submit_of(
+    client: &str,
+    reply_id: u64,
+    request_id: &str,
+    specification: JobSpecification,
+) -> Event {
     let request = Request::Submit {
         specification: Arc::new(specification),
         request_id: request_id.to_owned(),
-        client: String::new(),
+        client: client.to_owned(),
         priority: 0,
         name: String::new(),
     };

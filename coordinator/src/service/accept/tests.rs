@@ -40,7 +40,7 @@ async fn there_are_no_more_connections_than_places() {
     let _first_client = TcpStream::connect(address).await.unwrap();
     let _second_client = TcpStream::connect(address).await.unwrap();
     let (io, place) = accept(&bound, &places).await.unwrap();
-    let first = AcceptedConnection::new(Either::Right(io), Certificate::Absent, place);
+    let first = AcceptedConnection::new(Either::Right(io), None, Certificate::Absent, place);
     assert_eq!(places.available_permits(), 0);
     drop(first);
     // The permit is free again.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::{Data, Group, JobSpecification, VelocitySet};
-use osteon_common::limits::{JOBS_BYTES_CLIENT_DIVISOR, JOBS_MAX};
+use osteon_common::limits::{CLIENT_SHARE_DIVISOR, JOBS_MAX};
 use osteon_common::version;
 
 use super::{jobs, prune, workers};
@@ -82,9 +82,7 @@ fn submit(
     if let Some(known) = request.as_ref().and_then(|request| turn.state.requests.get(request)) {
         return resubmit(turn.state, reply_id, *known, &specification, request_id);
     }
-    if turn.state.unfinished() >= JOBS_MAX {
-        return Err(Refusal::TooManyJobs { limit: JOBS_MAX });
-    }
+    find_place(turn.state, &client)?;
     find_room(turn.state, &client, bytes(&specification))?;
     let id = JobId(turn.state.next_job);
     turn.state.next_job += 1;
@@ -107,6 +105,19 @@ fn submit(
     Ok(None)
 }
 
+/// Checks that one more job of a client fits beside those that have not ended.
+fn find_place(state: &State, client: &str) -> Result<(), Refusal> {
+    if state.unfinished() >= JOBS_MAX {
+        return Err(Refusal::TooManyJobs { limit: JOBS_MAX });
+    }
+    let limit = JOBS_MAX / CLIENT_SHARE_DIVISOR as usize;
+    if state.jobs.values().filter(|job| job.record.client == client).count() >= limit {
+        let client = client.to_owned();
+        return Err(Refusal::ClientHasTooManyJobs { client, limit, all: JOBS_MAX });
+    }
+    Ok(())
+}
+
 /// Checks that a specification of `more` bytes fits beside those of the jobs that have not ended.
 fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
     let of = |whose: &dyn Fn(&str) -> bool| -> u64 {
@@ -115,7 +126,7 @@ fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
     };
     let limit = state.config.jobs_bytes_max;
     for (whose, held, limit) in [
-        ("this client's", of(&|name| name == client), limit / JOBS_BYTES_CLIENT_DIVISOR),
+        ("this client's", of(&|name| name == client), limit / u64::from(CLIENT_SHARE_DIVISOR)),
         ("all", of(&|_| true), limit),
     ] {
         if held + more > limit {
