@@ -19,6 +19,7 @@ pub use access::tls::Tls;
 pub use access::tokens::Tokens;
 pub use config::Config;
 pub use live::listener::{PageBindError, PageListener};
+pub use live::other_pages::{OwnHosts, host_of, is_cross_site};
 pub use live::stalled::ReadPeer;
 pub use service::failing::ComponentFailure;
 pub use service::listen::{BindError, ListenAddress, Listener};

@@ -26,7 +26,7 @@ const KEPT: Duration = Duration::from_secs(60);
 
 /// Serves until SIGINT or SIGTERM, or until the workers cannot continue. The URL is printed.
 pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFailure> {
-    let ModelService { job, address, location, isa } = service;
+    let ModelService { job, address, hosts, location, isa } = service;
     let input = job.open().map_err(CommandFailure::bad_input)?;
     let kind = match job_file::purpose(&input).map_err(CommandFailure::bad_input)? {
         FilePurpose::Job(kind) => kind,
@@ -63,7 +63,7 @@ pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFa
         say(&format!("serving {}; Ctrl-C ends it", models.models().join(", ")));
         let url = format!("{}\n", listener.url());
         output::stdout(OutputFormat::Text).verbatim(&url).map_err(stdout_failure)?;
-        Ok::<_, CommandFailure>((router(models), evaluator))
+        Ok::<_, CommandFailure>((router(models, hosts), evaluator))
     };
     let ended = async {
         let (router, evaluator) = served.await?;
