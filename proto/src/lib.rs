@@ -18,6 +18,7 @@ mod fields;
 pub mod identity;
 pub mod malformed;
 pub mod parameter_values;
+pub mod patience;
 mod pipe;
 pub mod posterior;
 mod posterior_settings;
