@@ -347,3 +347,31 @@ fn a_run_of_ones_own_has_a_page_until_it_ends() {
         assert!(refused.stderr.contains(advice), "{refused:?}");
     }
 }
+
+/// Few open files are named before anything starts, with the number that is needed, with which it runs.
+#[test]
+fn too_few_open_files_are_named_at_once() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(8, 2));
+    let out = scratch.path("out");
+    let limited = |most: u64| {
+        let program = osteon();
+        let mut command = Command::new("sh");
+        command.args(["-c", "ulimit -n $0; exec \"$@\"", &most.to_string()]);
+        command.arg(program.get_program()).args(["identify", text(&file), "--workers", "2"]);
+        support::remove_settings(&mut command);
+        support::Finished::of(command.args(["--out", text(&out)]).output().unwrap())
+    };
+    let mut needed = None;
+    for most in [16, 24, 28, 32] {
+        let refused = limited(most);
+        assert_eq!(refused.code, Some(1), "{most}: {refused:?}");
+        let (_, told) = refused.stderr.split_once("this process may have ").unwrap();
+        let (found, told) = told.split_once(" open files and needs ").unwrap();
+        assert_eq!(found, most.to_string());
+        needed = told.split_once(": raise the limit with `ulimit -n ").unwrap().0.parse().ok();
+        assert!(!refused.stderr.contains("starting another"), "{most}: {refused:?}");
+        assert!(!out.exists(), "{most}");
+    }
+    limited(needed.unwrap()).succeeded();
+}

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use osteon_common::job::JobKind;
+use osteon_coordinator::service::open_files;
 use osteon_files::job_file::{self, FilePurpose};
 use osteon_proto::credentials::CredentialFiles;
 
@@ -47,6 +48,7 @@ pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFa
             remote
         }
         RunLocation::Local { workers, threads } => {
+            open_files::require_for_run(workers).map_err(CommandFailure::failed)?;
             let (store, keep_ended) = (StoreLocation::Memory, Some(KEPT));
             let setup = EmbeddedSetup { store, workers, threads, page: None, keep_ended };
             let started = Embedded::start(setup, Arc::clone(&evaluated)).await?;
