@@ -311,18 +311,26 @@ impl Client {
 
     /// Returns all jobs, oldest first.
     pub(crate) async fn list(&mut self) -> Result<Vec<JobSnapshot>, ClientError> {
-        let mut jobs = Vec::new();
+        Ok(self.list_with_concerns().await?.0)
+    }
+
+    /// Returns all jobs, oldest first, and what the coordinator's operator should know.
+    pub(crate) async fn list_with_concerns(
+        &mut self,
+    ) -> Result<(Vec<JobSnapshot>, Vec<String>), ClientError> {
+        let (mut jobs, mut concerns) = (Vec::new(), Vec::new());
         let mut page_token = String::new();
         for _ in 0..PAGES_MAX {
             let call = self.jobs.list(v1::ListRequest { page_size: 0, page_token });
             let page = self.peer.answered(call).await?;
             jobs.extend(page.jobs);
+            concerns.extend(page.concerns);
             page_token = page.next_page_token;
             if page_token.is_empty() {
                 break;
             }
         }
-        Ok(jobs)
+        Ok((jobs, concerns))
     }
 
     /// Returns the workers that are banned because they computed wrongly.

@@ -7,6 +7,8 @@ pub mod audit;
 pub(crate) mod batch;
 pub mod close_reason;
 pub mod completion;
+pub(crate) mod concerns;
+pub(crate) mod condition;
 pub(crate) mod crashes;
 pub mod dispute;
 pub(crate) mod distribution;

@@ -205,6 +205,8 @@ pub enum Answer {
         /// Last job of the page, if there are more.
         more_after: Option<JobId>,
     },
+    /// What an operator should know, as sentences.
+    Concerns(Vec<String>),
     /// The search of a job that has not ended.
     Followed(SearchRows),
     /// The job has ended; its output is in the store.

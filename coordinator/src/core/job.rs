@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::job::{Data, Group, JobKind, JobSpecification, VelocitySet};
 use osteon_common::parameters::Point;
 use osteon_proto::specification;
 use prost::Message as _;
@@ -25,6 +25,8 @@ pub(crate) struct Job {
     pub(crate) record: JobRecord,
     /// Digest of its specification, to compare two submissions with the same request id.
     pub(crate) identity: SpecificationDigest,
+    /// Approximate memory of its specification, bytes.
+    pub(crate) bytes: u64,
     pub(crate) stage: Stage,
     pub(crate) search: Search,
     /// Evaluations of points that its search will ask for when it comes to other groups and starts.
@@ -75,6 +77,7 @@ impl Job {
     pub(crate) fn new(record: JobRecord, stage: Stage, stored: u64, now: Duration) -> Self {
         Self {
             identity: identity(&record.specification),
+            bytes: bytes(&record.specification),
             search: Search::new(record.specification.clone()),
             ahead: Ahead::default(),
             speculation: Speculation::default(),
@@ -259,6 +262,21 @@ pub(crate) struct Speculation {
     pub(crate) candidates: Vec<Point>,
     /// Evaluations of candidates that have begun, in the order of their beginning.
     pub(crate) evaluations: Vec<PendingEvaluation>,
+}
+
+/// Returns the approximate memory of a specification, bytes.
+pub(crate) fn bytes(specification: &JobSpecification) -> u64 {
+    let of_data = |data: &Data| {
+        let names: usize =
+            data.groups().iter().map(|group| size_of::<Group>() + group.name.len()).sum();
+        let of_set = |set: VelocitySet<'_>| {
+            size_of_val(set.velocities) + set.subjects.map_or(0, size_of_val)
+        };
+        let sets: usize = (0..data.sets()).filter_map(|set| data.set(set)).map(of_set).sum();
+        names + sets
+    };
+    let data = specification.data.as_ref().map_or(0, of_data);
+    (size_of::<JobSpecification>() + data) as u64
 }
 
 /// A refusal of the store.

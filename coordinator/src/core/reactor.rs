@@ -40,7 +40,8 @@ mod tests;
 pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
     let mut turn = Turn::new(state, now);
     // A heartbeat makes no worker free, and heartbeats are frequent.
-    let frees = !matches!(event, Event::Heartbeat { .. });
+    let frees = !matches!(event, Event::Heartbeat { .. } | Event::Connections { .. });
+    turn.state.condition.note(&event, turn.now);
     apply(&mut turn, event);
     if frees {
         dispatch::dispatch(&mut turn);
@@ -73,6 +74,8 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::StoreFailed { job, key, error } => records::store_failed(turn, job, key, error),
         Event::Read { job, number, found } => replay::read(turn, job, number, found),
         Event::Pruned { reply_id, jobs, outcome } => prune::pruned(turn, reply_id, jobs, outcome),
+        // Noted for all events.
+        Event::Connections { .. } | Event::LogCopied | Event::LogStuck { .. } => {}
         Event::Drain => {
             ticks::save_parts(turn, true);
             workers::drain_all(turn);
@@ -96,4 +99,5 @@ fn tick(turn: &mut Turn) {
         prune::tick(turn);
     }
     ticks::publish(turn);
+    ticks::tell_concerns(turn);
 }

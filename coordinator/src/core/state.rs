@@ -14,6 +14,7 @@ use osteon_proto::evaluation;
 use crate::config::Config;
 use crate::core::answer_delay::AnswerDelay;
 use crate::core::batch::{Assignment, Batch, Purpose};
+use crate::core::condition::Condition;
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::event::Hello;
 use crate::core::fairness::Shares;
@@ -89,6 +90,8 @@ pub struct State {
     pub(crate) overdue: BTreeSet<BatchId>,
     /// Delay of the answers of all workers.
     pub(crate) delay: AnswerDelay,
+    /// What it was told of its surroundings.
+    pub(crate) condition: Condition,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
@@ -196,6 +199,7 @@ impl State {
             fleet_changes: 0,
             overdue: BTreeSet::new(),
             delay: AnswerDelay::default(),
+            condition: Condition::default(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,

@@ -122,7 +122,29 @@ fn of_state(state: &StateMeasurements) -> Vec<MetricFamily> {
             "Time for which the store has refused a record; 0 if it accepts them",
             state.store_refusing.as_secs_f64(),
         ),
+        gauge(
+            "osteon_store_log_stuck_seconds",
+            "Time for which the store's log could not be copied into its database; 0 if it could",
+            state.log_stuck.as_secs_f64(),
+        ),
+        gauge(
+            "osteon_store_log_stuck_bytes",
+            "Length of a log that could not be copied; 0 if it could",
+            state.log_stuck_bytes as f64,
+        ),
+        bounds_used(state),
     ]
+}
+
+/// The used parts of all hard bounds.
+fn bounds_used(state: &StateMeasurements) -> MetricFamily {
+    let used = state.bounds_used.iter();
+    let values = used.map(|(what, part)| (Some(("bound", what.name())), *part)).collect();
+    MetricFamily {
+        name: "osteon_bound_used_ratio",
+        help: "Used part of what is allowed; at 1 more is refused, or has to wait",
+        values: Values::Gauge(values),
+    }
 }
 
 /// Counters of jobs, evaluations, realizations and batches.

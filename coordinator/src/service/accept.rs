@@ -70,12 +70,37 @@ type Plain = Either<TcpStream, UnixStream>;
 pub(crate) fn connections(
     bound: BoundSocket,
     tls: Option<watch::Receiver<Tls>>,
+    places: Places,
 ) -> impl Stream<Item = io::Result<AcceptedConnection>> {
-    let acceptor = Acceptor::new(bound, tls, open_files::connections_max());
+    let acceptor = Acceptor::new(bound, tls, places);
     stream::unfold(acceptor, |mut acceptor| async {
         let connection = acceptor.next().await;
         Some((Ok(connection), acceptor))
     })
+}
+
+/// The places of the connections of one listener.
+#[derive(Debug, Clone)]
+pub(crate) struct Places {
+    free: Arc<Semaphore>,
+    most: usize,
+}
+
+impl Places {
+    /// Returns the places of a coordinator, as many as open files allow.
+    pub(crate) fn of_coordinator() -> Self {
+        Self::new(open_files::connections_max())
+    }
+
+    fn new(most: usize) -> Self {
+        Self { free: Arc::new(Semaphore::new(most)), most }
+    }
+
+    /// Returns how many are taken, and how many there are.
+    pub(crate) fn taken(&self) -> (u64, u64) {
+        let taken = self.most.saturating_sub(self.free.available_permits());
+        (taken as u64, self.most as u64)
+    }
 }
 
 /// Accepts connections of one listener.
@@ -83,7 +108,7 @@ pub(crate) struct Acceptor {
     bound: BoundSocket,
     /// Read for each connection, because it may be replaced while the coordinator runs.
     tls: Option<watch::Receiver<Tls>>,
-    places: Arc<Semaphore>,
+    places: Places,
     handshakes: JoinSet<Option<AcceptedConnection>>,
     /// Time of the last log line about failures to accept connections.
     complaint: Option<Instant>,
@@ -92,15 +117,8 @@ pub(crate) struct Acceptor {
 }
 
 impl Acceptor {
-    fn new(bound: BoundSocket, tls: Option<watch::Receiver<Tls>>, most: usize) -> Self {
-        Self {
-            bound,
-            tls,
-            places: Arc::new(Semaphore::new(most)),
-            handshakes: JoinSet::new(),
-            complaint: None,
-            is_of_pages: false,
-        }
+    fn new(bound: BoundSocket, tls: Option<watch::Receiver<Tls>>, places: Places) -> Self {
+        Self { bound, tls, places, handshakes: JoinSet::new(), complaint: None, is_of_pages: false }
     }
 
     /// Returns an acceptor of at most `most` connections of browsers at a time.
@@ -109,7 +127,7 @@ impl Acceptor {
         tls: Option<watch::Receiver<Tls>>,
         most: usize,
     ) -> Self {
-        Self { is_of_pages: true, ..Self::new(BoundSocket::Tcp(listener), tls, most) }
+        Self { is_of_pages: true, ..Self::new(BoundSocket::Tcp(listener), tls, Places::new(most)) }
     }
 
     /// Returns the next connection.
@@ -121,7 +139,7 @@ impl Acceptor {
                         return connection;
                     }
                 }
-                accepted = accept(&self.bound, &self.places),
+                accepted = accept(&self.bound, &self.places.free),
                     if self.handshakes.len() < HANDSHAKES_MAX =>
                 {
                     let (io, place) = match accepted {

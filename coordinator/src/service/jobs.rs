@@ -84,6 +84,14 @@ impl JobsService {
         answered(answer).await
     }
 
+    /// Returns what an operator should know, as sentences.
+    pub(crate) async fn concerns(&self) -> Result<Vec<String>, Status> {
+        match self.ask(event::Request::Concerns).await? {
+            Answer::Concerns(concerns) => Ok(concerns),
+            _ => Err(unexpected()),
+        }
+    }
+
     async fn submit_traced(
         &self,
         request: event::Request,
@@ -189,10 +197,12 @@ impl Jobs for JobsService {
             })?),
         };
         let limit = if page_size == 0 { PAGE_JOBS_MAX } else { page_size.min(PAGE_JOBS_MAX) };
+        let concerns = if after.is_none() { self.concerns().await? } else { Vec::new() };
         match self.ask(event::Request::List { after, limit: limit as usize }).await? {
             Answer::Page { snapshots, more_after } => Ok(Response::new(ListResponse {
                 jobs: snapshots,
                 next_page_token: more_after.map(|job| job.to_string()).unwrap_or_default(),
+                concerns,
             })),
             _ => Err(unexpected()),
         }

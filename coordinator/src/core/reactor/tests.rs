@@ -21,6 +21,7 @@ use crate::core::sanity::sanity_check;
 mod ahead;
 mod checks;
 mod completion;
+mod concerns;
 mod dispatch;
 mod explain;
 mod fairness;
@@ -291,6 +292,7 @@ fn answered(answer: &Answer) -> String {
             format!("{} workers, {} departed", list.workers.len(), list.departed.len())
         }
         Answer::Worker(worker) => format!("worker {} {:?}", worker.worker, worker.state()),
+        Answer::Concerns(concerns) => concerns.join(", "),
         Answer::Refused(refusal) => refusal.to_string(),
     }
 }
