@@ -3,6 +3,8 @@
 //! Results go to stdout through [`output`], everything else to stderr. Exit codes: 0 done, 1 the
 //! run failed or was cancelled, 2 bad usage or bad input, 130 and 143 ended by SIGINT and SIGTERM.
 
+#![forbid(unsafe_code)]
+
 mod arguments;
 mod certificates;
 mod client;

@@ -6,6 +6,8 @@
 //! it to people. An [`osteon_search::Search`] decides which points a job
 //! evaluates and does not depend on workers. This crate never links the solver: only workers solve.
 
+#![forbid(unsafe_code)]
+
 pub mod access;
 pub mod config;
 pub mod core;

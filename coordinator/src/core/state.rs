@@ -14,7 +14,6 @@ use osteon_proto::evaluation;
 use crate::config::Config;
 use crate::core::answer_delay::AnswerDelay;
 use crate::core::batch::{Assignment, Batch, Purpose};
-use crate::core::condition::Condition;
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::event::Hello;
 use crate::core::fairness::Shares;
@@ -24,6 +23,7 @@ use crate::core::notice::Departure;
 use crate::core::probation::Probation;
 use crate::core::rate::Rate;
 use crate::core::service_order::ServiceOrder;
+use crate::core::surroundings::Surroundings;
 use crate::core::worker_name::WorkerName;
 use crate::store::BanRecord;
 
@@ -91,7 +91,7 @@ pub struct State {
     /// Delay of the answers of all workers.
     pub(crate) delay: AnswerDelay,
     /// What it was told of its surroundings.
-    pub(crate) condition: Condition,
+    pub(crate) surroundings: Surroundings,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
@@ -199,7 +199,7 @@ impl State {
             fleet_changes: 0,
             overdue: BTreeSet::new(),
             delay: AnswerDelay::default(),
-            condition: Condition::default(),
+            surroundings: Surroundings::default(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,
