@@ -10,7 +10,7 @@ use osteon_common::limits::{JOBS_MAX, WORKERS_MAX};
 use crate::core::state::State;
 use crate::core::surroundings::{Bounded, ConcernKind};
 
-/// A log that could not be copied for less than this is no concern: somebody may be reading the database.
+/// A log that could not be copied for less than this is no concern: a disk may be full for a moment.
 const LOG_PATIENCE: Duration = Duration::from_secs(60);
 const MIB: u64 = 1 << 20;
 
@@ -131,7 +131,7 @@ impl fmt::Display for Concern {
             Self::LogStuck { time, bytes } => write!(
                 f,
                 "the store's log could not be copied into its database for {} s and has {} MiB: see \
-                 whether another program keeps the database open, and whether its disk is full",
+                 whether its disk is full or fails; nothing is lost, but it only grows",
                 time.as_secs(),
                 bytes / MIB
             ),

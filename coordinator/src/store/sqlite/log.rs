@@ -63,7 +63,8 @@ impl Log {
         let sql = "PRAGMA wal_checkpoint(PASSIVE)";
         let (all, copied): (i32, i32) =
             connection.query_row(sql, [], |row| Ok((row.get(1)?, row.get(2)?)))?;
-        // Whoever reads an older state of the database keeps the rest from being copied.
+        // Whoever reads an older state of the database keeps the rest from being copied; where the database is
+        // locked, as a running coordinator does, that is nobody.
         self.stuck.set(Some(all).filter(|all| copied < *all));
         Ok(())
     }
