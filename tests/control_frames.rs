@@ -1,6 +1,11 @@
 //! A flood of control frames of HTTP/2 ends its own connection, and others are answered meanwhile: with TLS and without.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test that cannot go on should say where, and what it measured"
+)]
 
 #[cfg(test)]
 #[path = "support/secure.rs"]

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use osteon_common::limits::{JOBS_MAX, WORKERS_MAX};
 
+use crate::core::service_condition::{Bounded, ConcernKind};
 use crate::core::state::State;
-use crate::core::surroundings::{Bounded, ConcernKind};
 
 /// A log that could not be copied for less than this is no concern: a disk may be full for a moment.
 const LOG_PATIENCE: Duration = Duration::from_secs(60);
@@ -47,7 +47,7 @@ impl Bounded {
                 (state.jobs.values().map(|job| job.bytes).sum(), state.config.jobs_bytes_max)
             }
             Self::Workers => (state.workers.len() as u64, WORKERS_MAX as u64),
-            Self::Connections => state.surroundings.connections,
+            Self::Connections => state.condition.connections,
         }
     }
 }
@@ -65,11 +65,11 @@ impl Concern {
 /// Returns everything that is a concern at `now`.
 pub(crate) fn concerns(state: &State, now: Duration) -> Vec<Concern> {
     let mut found = Vec::new();
-    if let Some(refusal) = &state.surroundings.refusal {
+    if let Some(refusal) = &state.condition.refusal {
         let (time, error) = (now.saturating_sub(refusal.since), refusal.error.clone());
         found.push(Concern::StoreRefuses { time, error });
     }
-    if let Some(stuck) = state.surroundings.stuck_log {
+    if let Some(stuck) = state.condition.stuck_log {
         let time = now.saturating_sub(stuck.since);
         if time >= LOG_PATIENCE {
             found.push(Concern::LogStuck { time, bytes: stuck.bytes });
@@ -96,10 +96,10 @@ pub(crate) fn new_ones(state: &mut State, now: Duration) -> Vec<Concern> {
         }
         _ => kinds.contains(kind),
     };
-    let mut told = state.surroundings.told.clone();
+    let mut told = state.condition.told.clone();
     told.retain(stays);
     all.retain(|concern| told.insert(concern.kind()));
-    state.surroundings.told = told;
+    state.condition.told = told;
     all
 }
 

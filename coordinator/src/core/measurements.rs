@@ -8,8 +8,8 @@ use osteon_proto::v1::WorkerState;
 
 use crate::core::job::{Job, Stage};
 use crate::core::reactor::realizations_held;
+use crate::core::service_condition::Bounded;
 use crate::core::state::{AttachedWorker, State};
-use crate::core::surroundings::Bounded;
 use crate::core::worker_list;
 
 /// A slot is worth having for a job if it is busy for this long in each evaluation, s. Batches that
@@ -60,8 +60,8 @@ impl StateMeasurements {
             batches_in_flight: state.batches.len() as u64,
             oldest_batch: since(state.batches.values().map(|batch| batch.sent).min()),
             store_refusing: since(refused_since(state)),
-            log_stuck: since(state.surroundings.stuck_log.map(|stuck| stuck.since)),
-            log_stuck_bytes: state.surroundings.stuck_log.map_or(0, |stuck| stuck.bytes),
+            log_stuck: since(state.condition.stuck_log.map(|stuck| stuck.since)),
+            log_stuck_bytes: state.condition.stuck_log.map_or(0, |stuck| stuck.bytes),
             bounds_used: Bounded::ALL.map(|what| (what, used_part(what, state))).to_vec(),
             ..Self::default()
         };

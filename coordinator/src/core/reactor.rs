@@ -41,7 +41,7 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
     let mut turn = Turn::new(state, now);
     // A heartbeat makes no worker free, and heartbeats are frequent.
     let frees = !matches!(event, Event::Heartbeat { .. } | Event::Connections { .. });
-    turn.state.surroundings.note(&event, turn.now);
+    turn.state.condition.note(&event, turn.now);
     apply(&mut turn, event);
     if frees {
         dispatch::dispatch(&mut turn);

@@ -22,8 +22,8 @@ use crate::core::job::{EndedJob, Job, RequestName, Stage};
 use crate::core::notice::Departure;
 use crate::core::probation::Probation;
 use crate::core::rate::Rate;
+use crate::core::service_condition::ServiceCondition;
 use crate::core::service_order::ServiceOrder;
-use crate::core::surroundings::Surroundings;
 use crate::core::worker_name::WorkerName;
 use crate::store::BanRecord;
 
@@ -91,7 +91,7 @@ pub struct State {
     /// Delay of the answers of all workers.
     pub(crate) delay: AnswerDelay,
     /// What it was told of its surroundings.
-    pub(crate) surroundings: Surroundings,
+    pub(crate) condition: ServiceCondition,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
@@ -199,7 +199,7 @@ impl State {
             fleet_changes: 0,
             overdue: BTreeSet::new(),
             delay: AnswerDelay::default(),
-            surroundings: Surroundings::default(),
+            condition: ServiceCondition::default(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,

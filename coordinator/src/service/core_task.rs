@@ -58,6 +58,14 @@ impl Clock {
     }
 }
 
+/// What follows the events of the core.
+pub(crate) struct Monitoring {
+    /// Present if metrics are exported.
+    pub(crate) meter: Option<Meter>,
+    /// Present if spans are recorded.
+    pub(crate) spans: Option<JobSpans>,
+}
+
 /// The task that owns the state.
 pub(crate) struct Core {
     state: State,
@@ -91,8 +99,7 @@ impl Core {
         events: mpsc::Sender<Event>,
         places: Places,
         failing: FailureReporter,
-        meter: Option<Meter>,
-        spans: Option<JobSpans>,
+        Monitoring { meter, spans }: Monitoring,
     ) -> Self {
         let config = state.config;
         Self {

@@ -154,10 +154,10 @@ pub(crate) fn store_pieces(turn: &mut Turn) {
 
 /// Tells the log what an operator should know.
 pub(crate) fn tell_concerns(turn: &mut Turn) {
-    if turn.now.saturating_sub(turn.state.surroundings.looked) < PUBLISH_EVERY {
+    if turn.now.saturating_sub(turn.state.condition.looked) < PUBLISH_EVERY {
         return;
     }
-    turn.state.surroundings.looked = turn.now;
+    turn.state.condition.looked = turn.now;
     let concerns = concerns::new_ones(turn.state, turn.now).into_iter();
     turn.effects.extend(concerns.map(|it| Effect::Note(Notice::Concern { text: it.to_string() })));
 }

@@ -44,7 +44,7 @@ pub(crate) struct StuckLog {
 
 /// What the core was told.
 #[derive(Debug, Default)]
-pub(crate) struct Surroundings {
+pub(crate) struct ServiceCondition {
     /// Open connections, and their maximum number.
     pub(crate) connections: (u64, u64),
     pub(crate) refusal: Option<StoreRefusal>,
@@ -55,7 +55,7 @@ pub(crate) struct Surroundings {
     pub(crate) looked: Duration,
 }
 
-impl Surroundings {
+impl ServiceCondition {
     /// Remembers what an event says.
     pub(crate) fn note(&mut self, event: &Event, now: Duration) {
         match event {
