@@ -7,6 +7,7 @@ use rcgen::{
     KeyUsagePurpose, SanType,
 };
 use time::{Duration, OffsetDateTime};
+use zeroize::Zeroizing;
 
 /// Validity of an authority in days.
 const AUTHORITY_DAYS: i64 = 3650;
@@ -20,7 +21,7 @@ pub(crate) struct PemPair {
     /// The certificate.
     pub(crate) certificate: String,
     /// Its private key, which is secret.
-    pub(crate) key: String,
+    pub(crate) key: Zeroizing<String>,
 }
 
 /// An authority that can sign.
@@ -49,7 +50,7 @@ impl Authority {
         params.not_before = now - CLOCK_MARGIN;
         params.not_after = now + Duration::days(AUTHORITY_DAYS);
         let certificate = params.self_signed(&key)?.pem();
-        let made = PemPair { certificate, key: key.serialize_pem() };
+        let made = PemPair { certificate, key: Zeroizing::new(key.serialize_pem()) };
         Ok((Self(Issuer::new(params, key)), made))
     }
 
@@ -86,9 +87,9 @@ impl Authority {
         params.use_authority_key_identifier_extension = true;
         params.not_before = now - CLOCK_MARGIN;
         params.not_after = now + Duration::days(i64::from(days));
-        let key = KeyPair::generate()?;
-        let certificate = params.signed_by(&key, &self.0)?.pem();
-        Ok(PemPair { certificate, key: key.serialize_pem() })
+        let key = Zeroizing::new(KeyPair::generate()?);
+        let certificate = params.signed_by(&*key, &self.0)?.pem();
+        Ok(PemPair { certificate, key: Zeroizing::new(key.serialize_pem()) })
     }
 }
 

@@ -12,13 +12,14 @@ use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
 use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::malformed::Malformed;
+use osteon_proto::patience::Patience;
 use osteon_proto::spans::{AttributeValue, OpenSpan, TRACEPARENT, TraceContext};
 use osteon_proto::specification;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{self, JobSnapshot};
 use thiserror::Error;
 use tokio::task::spawn_blocking;
-use tokio::time::{Instant, sleep, timeout};
+use tokio::time::sleep;
 use tonic::Code;
 
 use crate::environment::{COORDINATOR, Unused};
@@ -40,6 +41,9 @@ const ANSWER_S_MAX: u64 = 10;
 const SILENCE_S_MAX: u64 = 1;
 /// Pause between two attempts to reconnect to a coordinator, ms.
 const RETRY_MS: u64 = 250;
+/// Maximum number of attempts to fetch a result. The coordinator ends a fetch whose reader stands still, as
+/// this process does when the machine is suspended.
+const FETCHES_MAX: u32 = 3;
 /// Maximum number of pages of a job list; each holds up to 1000 jobs.
 const PAGES_MAX: usize = 10_000;
 
@@ -223,19 +227,23 @@ impl Client {
         endpoint: &Endpoint,
         credentials: &Credentials,
     ) -> Result<JobsClient<Connection>, ClientError> {
-        let begun = Instant::now();
+        let mut patience = Patience::of(answer_limit());
         loop {
-            let left = answer_limit().saturating_sub(begun.elapsed());
-            let error = match endpoint::connect_with(endpoint, credentials, left).await {
-                Ok(connection) => return Ok(endpoint::jobs_client(connection)),
-                Err(error) => error,
+            let left = patience.left();
+            let attempt = endpoint::connect_with(endpoint, credentials, left);
+            let error = match patience.wait_for(attempt).await {
+                Ok(Ok(connection)) => return Ok(endpoint::jobs_client(connection)),
+                Ok(Err(error)) => error,
+                Err(_) => ConnectError::Timeout {
+                    endpoint: endpoint.clone(),
+                    seconds: answer_limit().as_secs_f64(),
+                },
             };
-            let pause = Duration::from_millis(RETRY_MS);
             let again = matches!(error, ConnectError::Unreachable { .. });
-            if !again || begun.elapsed() + pause >= answer_limit() {
+            if !again || patience.left() <= retry_pause() {
                 return Err(error.into());
             }
-            sleep(pause).await;
+            patience.rest(retry_pause()).await;
         }
     }
 
@@ -276,16 +284,15 @@ impl Client {
             priority: options.priority,
             name: options.name,
         };
-        let (begun, mut uncertain) = (Instant::now(), false);
+        let (mut patience, mut uncertain) = (Patience::of(answer_limit()), false);
         loop {
-            let left = answer_limit().saturating_sub(begun.elapsed());
             let mut call = tonic::Request::new(message.clone());
             let context = span.and_then(|span| span.to_string().parse().ok());
             if let Some(context) = context {
                 call.metadata_mut().insert(TRACEPARENT, context);
             }
             let call = self.jobs.submit(call);
-            let error = match self.peer.answered_within(left, call).await {
+            let error = match self.peer.answered_within(&mut patience, call).await {
                 Ok(response) => return Ok(response.job),
                 Err(error) => error,
             };
@@ -294,29 +301,36 @@ impl Client {
             if !uncertain {
                 return Err(error);
             }
-            let pause = Duration::from_millis(RETRY_MS);
-            if !lost || begun.elapsed() + pause >= answer_limit() {
+            if !lost || patience.left() <= retry_pause() {
                 let (cause, request_id) = (Box::new(error), request.id.clone());
                 return Err(ClientError::Uncertain { cause, request_id });
             }
-            sleep(pause).await;
+            patience.rest(retry_pause()).await;
         }
     }
 
     /// Returns all jobs, oldest first.
     pub(crate) async fn list(&mut self) -> Result<Vec<JobSnapshot>, ClientError> {
-        let mut jobs = Vec::new();
+        Ok(self.list_with_concerns().await?.0)
+    }
+
+    /// Returns all jobs, oldest first, and what the coordinator's operator should know.
+    pub(crate) async fn list_with_concerns(
+        &mut self,
+    ) -> Result<(Vec<JobSnapshot>, Vec<String>), ClientError> {
+        let (mut jobs, mut concerns) = (Vec::new(), Vec::new());
         let mut page_token = String::new();
         for _ in 0..PAGES_MAX {
             let call = self.jobs.list(v1::ListRequest { page_size: 0, page_token });
             let page = self.peer.answered(call).await?;
             jobs.extend(page.jobs);
+            concerns.extend(page.concerns);
             page_token = page.next_page_token;
             if page_token.is_empty() {
                 break;
             }
         }
-        Ok(jobs)
+        Ok((jobs, concerns))
     }
 
     /// Returns the workers that are banned because they computed wrongly.
@@ -357,9 +371,10 @@ impl Client {
         job: &str,
         mut show: impl FnMut(&JobSnapshot) -> Result<(), E>,
     ) -> Result<JobSnapshot, E> {
-        let mut lost_since: Option<Instant> = None;
+        // What is left of the time to find a coordinator that is lost.
+        let mut search: Option<Patience> = None;
         loop {
-            let error = match self.watch_stream(job, &mut show, &mut lost_since).await? {
+            let error = match self.watch_stream(job, &mut show, &mut search).await? {
                 Ok(snapshot) => return Ok(snapshot),
                 Err(error) => error,
             };
@@ -372,11 +387,11 @@ impl Client {
                     )
                     | ClientError::Unanswered { .. }
             );
-            let since = *lost_since.get_or_insert_with(Instant::now);
-            if !gone || since.elapsed() >= answer_limit() {
+            let search = search.get_or_insert_with(|| Patience::of(answer_limit()));
+            if !gone || search.left().is_zero() {
                 return Err(error.into());
             }
-            sleep(Duration::from_millis(RETRY_MS)).await;
+            search.rest(retry_pause()).await;
         }
     }
 
@@ -386,10 +401,15 @@ impl Client {
         &mut self,
         job: &str,
         show: &mut impl FnMut(&JobSnapshot) -> Result<(), E>,
-        lost_since: &mut Option<Instant>,
+        search: &mut Option<Patience>,
     ) -> Result<Result<JobSnapshot, ClientError>, E> {
         let call = self.jobs.watch(v1::WatchRequest { job: job.to_owned(), after: 0 });
-        let mut stream = match self.peer.answered(call).await {
+        let limit = || Patience::of(answer_limit());
+        let answered = match search {
+            None => self.peer.answered_within(&mut limit(), call).await,
+            Some(search) => self.peer.answered_within(search, call).await,
+        };
+        let mut stream = match answered {
             Ok(stream) => stream,
             Err(error) => return Ok(Err(error)),
         };
@@ -408,7 +428,7 @@ impl Client {
                 }
                 Err(status) => return Ok(Err(self.peer.refused(&status))),
             };
-            *lost_since = None;
+            *search = None;
             show(&snapshot)?;
             if snapshot.state() == v1::JobState::Ended {
                 return Ok(Ok(snapshot));
@@ -416,13 +436,25 @@ impl Client {
         }
     }
 
-    /// Fetches the specification, result and history of an ended job.
+    /// Fetches the specification, result and history of an ended job. If the connection breaks meanwhile, it begins
+    /// again, a few times.
     pub(crate) async fn fetch(&mut self, job: &str) -> Result<Fetched, ClientError> {
+        for _ in 1..FETCHES_MAX {
+            match self.fetch_once(job).await {
+                Err(ClientError::Lost { .. }) => sleep(retry_pause()).await,
+                fetched => return fetched,
+            }
+        }
+        self.fetch_once(job).await
+    }
+
+    async fn fetch_once(&mut self, job: &str) -> Result<Fetched, ClientError> {
         let call = self.jobs.fetch(v1::FetchRequest { job: job.to_owned() });
         let mut stream = self.peer.answered(call).await?;
         let mut parts = FetchedParts::default();
         loop {
-            let Ok(message) = timeout(answer_limit(), stream.message()).await else {
+            let mut patience = Patience::of(answer_limit());
+            let Ok(message) = patience.wait_for(stream.message()).await else {
                 return Err(self.peer.silent());
             };
             match message {
@@ -463,6 +495,10 @@ async fn loaded(files: &CredentialFiles, endpoint: &Endpoint) -> Result<Credenti
 
 fn answer_limit() -> Duration {
     Duration::from_secs(ANSWER_S_MAX)
+}
+
+fn retry_pause() -> Duration {
+    Duration::from_millis(RETRY_MS)
 }
 
 #[cfg(test)]

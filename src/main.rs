@@ -4,6 +4,8 @@
 //! run failed or was cancelled, 2 bad usage or bad input, 77 this machine computes wrongly, 130 and 143 ended by
 //! SIGINT and SIGTERM.
 
+#![forbid(unsafe_code)]
+
 mod arguments;
 mod certificates;
 mod client;

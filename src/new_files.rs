@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::anyhow;
 use osteon_common::visible;
 use osteon_files::user_file;
+use zeroize::Zeroizing;
 
 use crate::exit_status::CommandFailure;
 
@@ -15,8 +16,8 @@ use crate::exit_status::CommandFailure;
 pub(crate) struct NewFile {
     /// Path of the file.
     pub(crate) path: PathBuf,
-    /// Content of the file.
-    pub(crate) text: String,
+    /// Content of the file; overwritten in memory when it is dropped.
+    pub(crate) text: Zeroizing<String>,
     /// Whether only its owner may read it.
     pub(crate) secret: bool,
 }

@@ -1,7 +1,7 @@
 //! A server of the UM-Bridge protocol, version 1.0: the model of a job as functions over HTTP, for
 //! samplers and other programs in any language.
 //!
-//! `listener` accepts connections, within the bounds of `crowd`, `routes` answers requests, `functions` knows what each model
+//! `listener` accepts connections, within the bounds of `crowd`, `gate` refuses what pages in browsers send, `routes` answers requests, `functions` knows what each model
 //! computes, and `evaluator` has its realizations computed by the workers of a coordinator.
 
 mod crowd;
@@ -9,6 +9,7 @@ mod derivatives;
 mod deterministic;
 mod evaluator;
 mod functions;
+mod gate;
 mod input_space;
 mod listener;
 mod model;

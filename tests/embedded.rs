@@ -146,6 +146,62 @@ fn the_stored_job_is_complete_and_runs_to_the_same_bits() {
     }
 }
 
+/// Returns the same job in other words: sections and keys in another order, with comments.
+fn in_other_words(job: &str) -> String {
+    let sections: Vec<&str> = job.trim().split("\n[").collect();
+    let mut text = "# The same job.\n".to_owned();
+    for section in sections.iter().rev() {
+        let mut lines = section.lines();
+        let name = lines.next().unwrap().trim_start_matches('[');
+        text.push_str(&format!("\n[{name} # a section\n"));
+        let mut keys: Vec<&str> = lines.collect();
+        keys.reverse();
+        keys.iter().for_each(|key| text.push_str(&format!("  {key}   # a key\n")));
+    }
+    text
+}
+
+#[test]
+fn a_job_in_other_words_over_a_touched_file_is_the_same_job() {
+    let scratch = Scratch::new();
+    let velocities: String = (0..30).map(|i| format!("{}\n", 3900 + 7 * i % 40)).collect();
+    let csv = format!("velocity\n{velocities}");
+    scratch.write("velocities.csv", &csv);
+    let moments = "mean = 3906.0\ncoefficient_of_variation = 0.0271\n";
+    let text_of = job(30, 4).replace(moments, "velocities = \"velocities.csv\"\n");
+    let file = scratch.write("job.toml", &text_of);
+    let out = scratch.path("out");
+    let arguments = ["identify", text(&file), "--json", "--out", text(&out)];
+    let first = run(&arguments).succeeded().to_owned();
+    let modified = || fs::metadata(out.join("result.json")).unwrap().modified().unwrap();
+    let before = modified();
+    scratch.write("velocities.csv", &format!("# measured again? no\n{csv}"));
+    scratch.write("job.toml", &in_other_words(&text_of));
+    assert_eq!(run(&arguments).succeeded(), first);
+    assert_eq!(modified(), before, "it was computed again");
+    let anew = run(&["identify", text(&file), "--json"]).json();
+    assert!(first.contains(anew["digest"].as_str().unwrap()), "{anew}");
+}
+
+#[test]
+fn an_interrupted_run_is_continued_by_the_same_job_in_other_words() {
+    let scratch = Scratch::new();
+    let out = scratch.path("out");
+    let (LongRun { mut process, .. }, stored) = LongRun::under_way(&scratch, &out);
+    process.signal("TERM");
+    assert_eq!(process.code(), Some(143));
+    let mut run = LongRun::start_as(&in_other_words(&long_job()), &scratch, &out);
+    let mut first = None;
+    eventually("the job goes on", || {
+        first = only_evaluations(&run.url);
+        first.is_some()
+    });
+    assert!(first >= Some(stored), "{first:?} of {stored} evaluations");
+    assert_eq!(run.process.code(), Some(0));
+    let result = fs::read_to_string(out.join("result.json")).unwrap();
+    assert_eq!(&serde_json::from_str::<Value>(&result).unwrap(), undisturbed());
+}
+
 /// A search of a few seconds.
 fn long_job() -> String {
     job(60, 50)
@@ -171,7 +227,12 @@ struct LongRun {
 
 impl LongRun {
     fn start(scratch: &Scratch, out: &Path) -> Self {
-        let job = scratch.write("long.toml", &long_job());
+        Self::start_as(&long_job(), scratch, out)
+    }
+
+    /// Same as [`start`](Self::start), with another text of the job.
+    fn start_as(job: &str, scratch: &Scratch, out: &Path) -> Self {
+        let job = scratch.write("long.toml", job);
         let mut command = osteon();
         command.args(["identify", text(&job), "--json", "--out", text(out)]);
         let process = Owned::spawn_logging(&mut command, &scratch.path("run.log"));
@@ -346,4 +407,32 @@ fn a_run_of_ones_own_has_a_page_until_it_ends() {
         assert_eq!(refused.code, Some(2), "{refused:?}");
         assert!(refused.stderr.contains(advice), "{refused:?}");
     }
+}
+
+/// Few open files are named before anything starts, with the number that is needed, with which it runs.
+#[test]
+fn too_few_open_files_are_named_at_once() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(8, 2));
+    let out = scratch.path("out");
+    let limited = |most: u64| {
+        let program = osteon();
+        let mut command = Command::new("sh");
+        command.args(["-c", "ulimit -n $0; exec \"$@\"", &most.to_string()]);
+        command.arg(program.get_program()).args(["identify", text(&file), "--workers", "2"]);
+        support::remove_settings(&mut command);
+        support::Finished::of(command.args(["--out", text(&out)]).output().unwrap())
+    };
+    let mut needed = None;
+    for most in [16, 24, 28, 32] {
+        let refused = limited(most);
+        assert_eq!(refused.code, Some(1), "{most}: {refused:?}");
+        let (_, told) = refused.stderr.split_once("this process may have ").unwrap();
+        let (found, told) = told.split_once(" open files and needs ").unwrap();
+        assert_eq!(found, most.to_string());
+        needed = told.split_once(": raise the limit with `ulimit -n ").unwrap().0.parse().ok();
+        assert!(!refused.stderr.contains("starting another"), "{most}: {refused:?}");
+        assert!(!out.exists(), "{most}");
+    }
+    limited(needed.unwrap()).succeeded();
 }

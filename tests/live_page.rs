@@ -335,13 +335,16 @@ fn ten_thousand_jobs_are_shown_page_by_page() {
     let file = served.scratch.write("job.toml", &job(1, 3));
     let specification = api::specification(&file, JobKind::Identification);
     let mut api = api::Api::new(served.service.url());
-    for _ in 0..count / 500 {
+    for block in 0..count / 500 {
+        // One client may have a quarter of the jobs.
+        let client_name = format!("client {}", block % 4);
         let submitted = api.call(async |client| {
             let mut calls = tokio::task::JoinSet::new();
             for _ in 0..500 {
                 let (mut client, specification) = (client.clone(), specification.clone());
                 let request = SubmitRequest {
                     specification: Some(specification),
+                    client: client_name.clone(),
                     ..SubmitRequest::default()
                 };
                 calls.spawn(async move { client.submit(request).await.map(|_| ()) });

@@ -304,6 +304,19 @@ fn workers_are_submitted_when_jobs_wait_and_a_refusal_is_not_repeated_at_once() 
     let lines = (1..=4).map(|task| format!("17_{task}|{name}|PENDING|0:00|Resources\n"));
     stage.scratch.write("slurm/queue", &lines.collect::<String>());
     eventually("the queue is seen", || read().contains("0 run, 4 wait in Slurm's queue"));
+    // The refused one, and one for all four workers.
+    assert_eq!(stage.noted("sbatch").lines().count(), 2);
+
+    // squeue vanishes for a while, as during an upgrade.
+    let (here, away) = (stage.path("bin/squeue"), stage.path("bin/away"));
+    fs::rename(&here, &away).unwrap();
+    eventually("it says so", || read().contains("cannot look now; trying again"));
+    stage.scratch.write("slurm/queue", &format!("17_1|{name}|RUNNING|0:10|None\n"));
+    fs::rename(&away, &here).unwrap();
+    eventually("it goes on", || read().contains("1 run, 0 wait in Slurm's queue"));
+    // It hangs, and nobody waits for it to end.
+    stage.scratch.write("bin/squeue", "#!/bin/bash\ntouch \"$SLURM_TEST/hangs\"\nexec sleep 600\n");
+    eventually("squeue hangs", || stage.path("slurm/hangs").exists());
     process.signal("TERM");
     assert_eq!(process.code(), Some(143), "{}", read());
 }

@@ -133,6 +133,19 @@ fn state_and_reactions_know_no_clock_no_socket_and_no_future() {
 }
 
 /// `proptest!` reads environment variables, uses a new seed each time, and writes files.
+/// Only the solver needs code that the compiler cannot check, for registers and instruction sets.
+#[test]
+fn unsafe_code_is_forbidden_outside_of_the_solver() {
+    let is_root = |path: &PathBuf| path.parent().is_some_and(|folder| folder.ends_with("src"));
+    let roots = files(&["lib.rs", "main.rs"]).into_iter().filter(is_root);
+    let roots: Vec<_> = roots.filter(|root| !root.ends_with("solver/src/lib.rs")).collect();
+    assert!(roots.len() > 10, "{roots:?}");
+    for root in roots {
+        let text = fs::read_to_string(&root).unwrap();
+        assert!(text.contains("\n#![forbid(unsafe_code)]\n"), "{}", root.display());
+    }
+}
+
 #[test]
 fn properties_are_tested_on_the_same_cases_everywhere() {
     let helper = root().join("fuzz/src");

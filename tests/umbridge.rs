@@ -61,12 +61,17 @@ impl Server {
 
     /// Sends a request without a content type.
     fn send(&self, method: &str, path: &str, body: &str) -> Answered {
+        self.send_with(method, path, &format!("Host: {}\r\n", self.address), body)
+    }
+
+    /// Sends a request with lines of its own in its header.
+    fn send_with(&self, method: &str, path: &str, lines: &str, body: &str) -> Answered {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         stream.set_read_timeout(Some(DEADLINE)).unwrap();
-        let (host, length) = (&self.address, body.len());
+        let length = body.len();
         write!(
             stream,
-            "{method} {path} HTTP/1.1\r\nHost: {host}\r\nContent-Length: {length}\r\n\
+            "{method} {path} HTTP/1.1\r\n{lines}Content-Length: {length}\r\n\
              Connection: close\r\n\r\n{body}"
         )
         .unwrap();
@@ -290,7 +295,7 @@ fn a_coordinator_computes_for_many_clients() {
     let body = body.to_string();
     write!(
         stream,
-        "POST /Evaluate HTTP/1.1\r\nHost: x\r\nContent-Length: {}\r\n\r\n{body}",
+        "POST /Evaluate HTTP/1.1\r\nHost: localhost\r\nContent-Length: {}\r\n\r\n{body}",
         body.len()
     )
     .unwrap();
@@ -301,6 +306,35 @@ fn a_coordinator_computes_for_many_clients() {
     eventually("the long job runs", || jobs("10000000") == 1);
     drop(stream);
     eventually("the long job is cancelled", || jobs("cancelled") == 1);
+}
+
+/// A page in the user's browser can have no point computed, whatever it sends, and programs can.
+#[test]
+fn pages_of_a_browser_are_refused() {
+    let scratch = Scratch::new();
+    let job = scratch.write("job.toml", &propagation(10));
+    let options = ["--workers", "1", "--threads", "1", "--http-host", "model.example"];
+    let server = Server::start(&job, &options);
+    let body = json!({"name": "velocity", "input": [vec![1.0; 6]]}).to_string();
+    let own = format!("Host: {}\r\n", server.address);
+    for (lines, status, word) in [
+        (format!("{own}Content-Type: application/json\r\n"), 200, "output"),
+        // What the client in C++ sends.
+        (format!("{own}Content-Type: text/plain\r\n"), 200, "output"),
+        ("Host: model.example\r\n".to_owned(), 200, "output"),
+        (
+            format!("{own}Origin: https://evil.example\r\nContent-Type: text/plain\r\n"),
+            403,
+            "from a page in a browser",
+        ),
+        (format!("{own}Sec-Fetch-Site: cross-site\r\n"), 403, "from a page in a browser"),
+        ("Host: evil.example:4242\r\n".to_owned(), 421, "--http-host"),
+    ] {
+        let answered = server.send_with("POST", "/Evaluate", &lines, &body);
+        assert_eq!(answered.status, status, "{lines}: {answered:?}");
+        assert!(answered.body.contains(word), "{lines}: {answered:?}");
+        assert!(!answered.headers.contains("access-control"), "{answered:?}");
+    }
 }
 
 /// Beyond the connections that are served some wait for a place, and others are refused at once.

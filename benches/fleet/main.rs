@@ -37,7 +37,7 @@ use measured::{HEADER, measure};
 async fn main() -> Result<()> {
     let rows = FleetArguments::parse().rows()?;
     // A connection of each worker; the coordinator inherits the limit.
-    open_files::raise_limit();
+    open_files::raise_limit()?;
     println!("{HEADER}");
     let mut digest: Option<String> = None;
     for row in &rows {

@@ -10,6 +10,8 @@
 //! Naili, "Experimental identification in the ultrasonic range of a mechanical model for cortical
 //! bones"; see `docs/physics.md`.
 
+#![forbid(unsafe_code)]
+
 mod accepted;
 pub mod attainable_moments;
 pub mod attenuation;

@@ -76,9 +76,9 @@ pub const WORKERS_MAX: usize = 4096;
 pub const JOBS_MAX: usize = 10_000;
 /// Maximum total size of the specifications of jobs that wait or run, bytes.
 pub const JOBS_BYTES_MAX: u64 = 1 << 30;
-/// The specifications of the jobs of one client may take at most [`JOBS_BYTES_MAX`] divided by this
-/// number.
-pub const JOBS_BYTES_CLIENT_DIVISOR: u64 = 4;
+/// One client's share of [`JOBS_MAX`] and of [`JOBS_BYTES_MAX`] is each of them divided by this number,
+/// so that no client alone shuts out the others.
+pub const CLIENT_SHARE_DIVISOR: u32 = 4;
 /// Maximum total number of realizations in the evaluations under way, over all jobs; each takes about
 /// 50 bytes of memory.
 pub const ACTIVE_REALIZATIONS_MAX: u64 = 2 * REALIZATIONS_MAX;

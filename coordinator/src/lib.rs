@@ -6,6 +6,8 @@
 //! it to people. An [`osteon_search::Search`] decides which points a job
 //! evaluates and does not depend on workers. This crate never links the solver: only workers solve.
 
+#![forbid(unsafe_code)]
+
 pub mod access;
 pub mod config;
 pub mod core;
@@ -19,6 +21,7 @@ pub use access::tls::Tls;
 pub use access::tokens::Tokens;
 pub use config::Config;
 pub use live::listener::{PageBindError, PageListener};
+pub use live::other_pages::{OwnHosts, host_of, is_cross_site};
 pub use live::stalled::ReadPeer;
 pub use service::failing::ComponentFailure;
 pub use service::listen::{BindError, ListenAddress, Listener};

@@ -10,6 +10,7 @@ pub(crate) mod events;
 pub(crate) mod gate;
 pub(crate) mod json;
 pub mod listener;
+pub mod other_pages;
 pub(crate) mod overview;
 pub(crate) mod query;
 pub(crate) mod routes;

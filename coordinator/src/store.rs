@@ -208,6 +208,12 @@ pub trait Store {
         false
     }
 
+    /// Returns the length of a log, bytes, that could not be emptied the last time that this was due; `None` if it
+    /// could, or if there is no log.
+    fn stuck_log(&self) -> Option<u64> {
+        None
+    }
+
     /// Returns all jobs, in the order of their identifiers.
     ///
     /// # Errors

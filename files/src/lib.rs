@@ -7,6 +7,8 @@
 //!
 //! Every file that a user names is opened by [`user_file`].
 
+#![forbid(unsafe_code)]
+
 pub mod case_file;
 pub mod document;
 mod document_text;

@@ -1,6 +1,7 @@
 //! Reading a file takes memory in proportion to what a job needs, whatever is in the file.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![expect(unsafe_code, reason = "an allocator that counts")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::Write as _;

@@ -7,6 +7,8 @@
 //! input is accepted again, with the same meaning, after it is written out. `cargo xtask random`
 //! runs more such cases.
 
+#![forbid(unsafe_code)]
+
 mod bound;
 mod corpus;
 mod damage;

@@ -10,6 +10,9 @@ use crate::evaluation::EvaluationInput;
 use crate::malformed::Malformed;
 use crate::v1;
 
+/// Longest computing time that an answer may state, s: a hundred days, which no batch takes.
+const ELAPSED_S_MAX: f64 = 1e7;
+
 /// The work of one batch: realizations `first`, `first + 1`, … `first + count - 1` of one
 /// evaluation.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,10 +70,14 @@ pub fn answer_to_message(
 /// Returns the realizations of an answer, in index order.
 ///
 /// # Errors
-/// If the lengths differ, if a code and a velocity do not encode an outcome, or if an estimated
-/// error or a decay is not allowed for its outcome. Without decays, each is 0.
+/// If the lengths differ, if a code and a velocity do not encode an outcome, if an estimated error or a
+/// decay is not allowed for its outcome, or if the computing time is none. Without decays, each is 0.
 pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationResult>, Malformed> {
-    let v1::BatchResult { codes, velocities, estimated_errors, decays, .. } = message;
+    let v1::BatchResult { codes, velocities, estimated_errors, decays, elapsed_s, .. } = message;
+    if !(0.0..=ELAPSED_S_MAX).contains(elapsed_s) {
+        let allowed = "it must be from 0 to 10^7 s";
+        return Err(Malformed::OutOfRange { field: "elapsed_s", value: *elapsed_s, allowed });
+    }
     let expected = codes.len();
     for (field, found) in
         [("velocities", velocities.len()), ("estimated_errors", estimated_errors.len())]
@@ -168,6 +175,15 @@ mod tests {
         assert_eq!(refused(|answer| answer.estimated_errors[1] = 1e-5), unsound(1, 1e-5));
         let infinite = refused(|answer| answer.estimated_errors[2] = f64::INFINITY);
         assert_eq!(infinite, unsound(2, f64::INFINITY));
+        for change in [
+            (|answer| answer.elapsed_s = f64::NAN) as fn(&mut v1::BatchResult),
+            |answer| answer.elapsed_s = f64::INFINITY,
+            |answer| answer.elapsed_s = -1.0,
+            |answer| answer.elapsed_s = 1e300,
+        ] {
+            let found = refused(change);
+            assert!(matches!(found, Malformed::OutOfRange { field: "elapsed_s", .. }), "{found}");
+        }
         let wrong_code = refused(|answer| answer.codes[0] = 1);
         assert!(matches!(wrong_code, Malformed::Outcome { index: 0, .. }));
     }

@@ -11,12 +11,13 @@ use osteon_common::limits::{CREDENTIAL_FILE_BYTES_MAX, CREDENTIAL_PIPE_SECONDS_M
 use osteon_common::visible;
 use osteon_files::user_file;
 use thiserror::Error;
-use tokio_rustls::rustls;
 use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::pki_types::pem::{self, PemObject as _};
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, UnixTime};
 use tokio_rustls::rustls::sign::CertifiedKey;
+use tokio_rustls::rustls::{self, InconsistentKeys};
 use webpki::{EndEntityCert, KeyUsage};
+use zeroize::Zeroizing;
 
 use crate::pipe;
 use crate::token::{NoToken, Token};
@@ -210,35 +211,27 @@ impl From<&pem::Error> for PemFault {
     }
 }
 
-/// A certificate with its chain, and its key.
-#[derive(Debug)]
-pub struct CertificateAndKey {
-    /// The chain, which starts with the certificate itself.
-    pub chain: Vec<CertificateDer<'static>>,
-    /// The private key of the first certificate.
-    pub key: PrivateKeyDer<'static>,
-}
-
-/// Reads a certificate and its key, and checks that they match and that the certificate is
-/// currently valid.
+/// Reads a certificate with its chain, and its key, and checks that they match and that the certificate is
+/// currently valid. Of the key, only what signs is left in memory.
 ///
 /// # Errors
 /// If a file cannot be used.
-pub fn identity(certificate: &Path, key: &Path) -> Result<CertificateAndKey, CredentialError> {
+pub fn identity(certificate: &Path, key: &Path) -> Result<CertifiedKey, CredentialError> {
     let chain = certificates(certificate)?;
     check_validity_dates(certificate, &chain)?;
     let private = private_key(key)?;
     let cannot = |source| CredentialError::Key { path: key.to_owned(), source };
-    let provider = ring::default_provider();
-    match CertifiedKey::from_der(chain.clone(), private.clone_key(), &provider) {
-        Ok(_) => {}
+    let signing = ring::sign::any_supported_type(&private).map_err(cannot)?;
+    let identity = CertifiedKey::new(chain, signing);
+    match identity.keys_match() {
+        // Of some keys that cannot be known.
+        Ok(()) | Err(rustls::Error::InconsistentKeys(InconsistentKeys::Unknown)) => Ok(identity),
         Err(rustls::Error::InconsistentKeys(_)) => {
             let (certificate, key) = (certificate.to_owned(), key.to_owned());
-            return Err(CredentialError::Mismatch { certificate, key });
+            Err(CredentialError::Mismatch { certificate, key })
         }
-        Err(source) => return Err(cannot(source)),
+        Err(source) => Err(cannot(source)),
     }
-    Ok(CertificateAndKey { chain, key: private })
 }
 
 /// Reads a file of certificates, which contains at least one.
@@ -268,7 +261,7 @@ pub fn token(path: &Path) -> Result<Token, CredentialError> {
 ///
 /// # Errors
 /// If the file cannot be used.
-pub fn secret_text(path: &Path) -> Result<String, CredentialError> {
+pub fn secret_text(path: &Path) -> Result<Zeroizing<String>, CredentialError> {
     text(path, FileAccess::Secret)
 }
 
@@ -277,20 +270,24 @@ pub fn secret_text(path: &Path) -> Result<String, CredentialError> {
 /// # Errors
 /// If the file cannot be used.
 pub fn trusted_text(path: &Path) -> Result<String, CredentialError> {
-    text(path, FileAccess::Trusted)
+    Ok(std::mem::take(&mut *text(path, FileAccess::Trusted)?))
 }
 
-fn text(path: &Path, kind: FileAccess) -> Result<String, CredentialError> {
-    let bytes = read(path, kind)?;
-    String::from_utf8(bytes).map_err(|_| CredentialError::NoText { path: path.to_owned() })
+fn text(path: &Path, kind: FileAccess) -> Result<Zeroizing<String>, CredentialError> {
+    let mut bytes = read(path, kind)?;
+    String::from_utf8(std::mem::take(&mut *bytes)).map(Zeroizing::new).map_err(|error| {
+        drop(Zeroizing::new(error.into_bytes()));
+        CredentialError::NoText { path: path.to_owned() }
+    })
 }
 
-fn private_key(path: &Path) -> Result<PrivateKeyDer<'static>, CredentialError> {
+fn private_key(path: &Path) -> Result<Zeroizing<PrivateKeyDer<'static>>, CredentialError> {
     let bytes = read(path, FileAccess::Secret)?;
-    PrivateKeyDer::from_pem_slice(&bytes).map_err(|source| match source {
+    let key = PrivateKeyDer::from_pem_slice(&bytes).map_err(|source| match source {
         pem::Error::NoItemsFound => CredentialError::NoKey { path: path.to_owned() },
         error => damaged(path, &error),
-    })
+    });
+    key.map(Zeroizing::new)
 }
 
 fn damaged(path: &Path, error: &pem::Error) -> CredentialError {
@@ -301,7 +298,7 @@ fn damaged(path: &Path, error: &pem::Error) -> CredentialError {
 /// is later given to another one. A pipe is accepted, so that a secret need not be on a disk. Its
 /// permissions are checked, too, since a named pipe that others can read would let them take the
 /// secret.
-fn read(path: &Path, kind: FileAccess) -> Result<Vec<u8>, CredentialError> {
+fn read(path: &Path, kind: FileAccess) -> Result<Zeroizing<Vec<u8>>, CredentialError> {
     let unreadable = |source| CredentialError::Unreadable { path: path.to_owned(), source };
     let file = user_file::open_or_pipe(path).map_err(unreadable)?;
     let metadata = file.metadata().map_err(unreadable)?;
@@ -319,7 +316,7 @@ fn read(path: &Path, kind: FileAccess) -> Result<Vec<u8>, CredentialError> {
     let piped = metadata.file_type().is_fifo();
     let bytes = match piped {
         true => pipe::read(&file, max, Duration::from_secs(CREDENTIAL_PIPE_SECONDS_MAX)),
-        false => user_file::read_opened(&file, max),
+        false => user_file::read_opened(&file, max).map(|bytes| bytes.map(Zeroizing::new)),
     };
     match bytes.map_err(unreadable)? {
         Some(bytes) if piped && bytes.is_empty() => {

@@ -7,11 +7,13 @@ use std::sync::Arc;
 use thiserror::Error;
 use tokio_rustls::TlsConnector;
 use tokio_rustls::rustls::crypto::ring;
+use tokio_rustls::rustls::sign::SingleCertAndKey;
 use tokio_rustls::rustls::version::TLS13;
 use tokio_rustls::rustls::{self, ClientConfig, RootCertStore};
 use tonic::metadata::{Ascii, MetadataValue};
 use tonic::service::Interceptor;
 use tonic::{Request, Status};
+use zeroize::Zeroizing;
 
 use crate::credential_file::{self, CredentialError};
 use crate::endpoint::Endpoint;
@@ -131,7 +133,8 @@ impl CredentialFiles {
 
 impl TokenInterceptor {
     fn new(token: Option<&Token>) -> Self {
-        let header = token.and_then(|token| format!("Bearer {}", token.reveal()).parse().ok());
+        let bearer = |token: &Token| Zeroizing::new(format!("Bearer {}", token.reveal()));
+        let header = token.and_then(|token| bearer(token).parse().ok());
         Self(header.map(|mut header: MetadataValue<Ascii>| {
             // Sensitive headers are not printed and not kept in the table of header compression.
             header.set_sensitive(true);
@@ -182,7 +185,7 @@ fn connector(files: &CredentialFiles, endpoint: &Endpoint) -> Result<Connector, 
     let mut config = match (&files.certificate, &files.key) {
         (Some(certificate), Some(key)) => {
             let identity = credential_file::identity(certificate, key)?;
-            config.with_client_auth_cert(identity.chain, identity.key).map_err(tls)?
+            config.with_client_cert_resolver(Arc::new(SingleCertAndKey::from(identity)))
         }
         (None, None) => config.with_no_client_auth(),
         (Some(_), None) => return Err(CredentialsError::Half { missing: "--tls-key" }),

@@ -22,6 +22,7 @@ use tonic::transport::{Channel, Endpoint as Transport, Uri};
 use tower::service_fn;
 
 use crate::credentials::{Connector, Credentials, TokenInterceptor};
+use crate::patience::Patience;
 use crate::tls_failure::TlsFailure;
 use crate::v1::jobs_client::JobsClient;
 use crate::v1::workers_client::WorkersClient;
@@ -254,7 +255,7 @@ async fn channel(
             }
         }
     };
-    match tokio::time::timeout(timeout, attempt).await {
+    match Patience::of(timeout).wait_for(attempt).await {
         Ok(Ok(channel)) => Ok(channel),
         Ok(Err(error)) => Err(unconnected(endpoint, &error)),
         Err(_) => Err(ConnectError::Timeout {

@@ -5,6 +5,8 @@
 //! [`osteon_common::violations::Violations`] is reported at once. A message from a coordinator or a
 //! worker is either well formed or a typed [`malformed::Malformed`].
 
+#![forbid(unsafe_code)]
+
 pub mod announced;
 pub mod batch;
 pub mod choice;
@@ -18,6 +20,7 @@ mod fields;
 pub mod identity;
 pub mod malformed;
 pub mod parameter_values;
+pub mod patience;
 mod pipe;
 pub mod posterior;
 mod posterior_settings;

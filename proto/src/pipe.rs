@@ -6,6 +6,10 @@ use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use thiserror::Error;
+use zeroize::Zeroizing;
+
+/// Length of a piece that is read at once, bytes.
+const PIECE_BYTES: usize = 4096;
 
 /// A pipe was not closed by its writers in time; used as the payload of an [`io::Error`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
@@ -24,9 +28,9 @@ pub(crate) fn read(
     mut pipe: &File,
     bytes_max: u64,
     limit: Duration,
-) -> io::Result<Option<Vec<u8>>> {
+) -> io::Result<Option<Zeroizing<Vec<u8>>>> {
     let begun = Instant::now();
-    let (mut bytes, mut piece) = (Vec::new(), [0; 4096]);
+    let (mut bytes, mut piece) = (Zeroizing::new(Vec::new()), Zeroizing::new([0; PIECE_BYTES]));
     loop {
         let left = limit.saturating_sub(begun.elapsed());
         // Without polling, a pipe that has not been opened for writing yet would appear to be at
@@ -44,9 +48,9 @@ pub(crate) fn read(
             Err(rustix::io::Errno::INTR) => continue,
             Err(error) => return Err(error.into()),
         }
-        match pipe.read(&mut piece) {
+        match pipe.read(&mut *piece) {
             Ok(0) => return Ok(Some(bytes)),
-            Ok(count) => bytes.extend(&piece[..count]),
+            Ok(count) => append(&mut bytes, &piece[..count]),
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
@@ -55,6 +59,17 @@ pub(crate) fn read(
             return Ok(None);
         }
     }
+}
+
+/// Appends bytes; what becomes too short for them is overwritten before it is freed.
+fn append(bytes: &mut Zeroizing<Vec<u8>>, more: &[u8]) {
+    let length = bytes.len() + more.len();
+    if length > bytes.capacity() {
+        let mut longer = Zeroizing::new(Vec::with_capacity(2 * length));
+        longer.extend_from_slice(bytes);
+        *bytes = longer;
+    }
+    bytes.extend_from_slice(more);
 }
 
 #[cfg(test)]
@@ -87,9 +102,9 @@ mod tests {
             writer.join().unwrap();
             bytes
         };
-        assert_eq!(written(b"a secret", 8).as_deref(), Some(&b"a secret"[..]));
+        assert_eq!(written(b"a secret", 8).as_deref().map(Vec::as_slice), Some(&b"a secret"[..]));
         assert_eq!(written(b"a secret", 7), None);
-        assert_eq!(written(b"", 7).as_deref(), Some(&b""[..]));
+        assert_eq!(written(b"", 7).as_deref().map(Vec::as_slice), Some(&b""[..]));
         // The wait is limited for a writer that never comes, and for one that never closes the
         // pipe.
         let pipe = open_or_pipe(&path).unwrap();

@@ -4,6 +4,7 @@
 use std::fmt;
 
 use thiserror::Error;
+use zeroize::Zeroizing;
 
 use crate::identity::{self, NoRandomness};
 
@@ -17,9 +18,10 @@ const TOKEN_CHARACTERS: usize = PREFIX.len() + 2 * RANDOM_BYTES;
 const HASH_PREFIX: &str = "blake3:";
 
 /// A token. It has so many random bits that a fast hash is safe; therefore only tokens of the form
-/// of [`Token::generate`] are accepted, never a password chosen by a person.
+/// of [`Token::generate`] are accepted, never a password chosen by a person. Its memory is overwritten when it is
+/// dropped.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Token(String);
+pub struct Token(Zeroizing<String>);
 
 /// The text is not a token. The error does not contain the text, which may be another secret.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
@@ -39,8 +41,13 @@ impl Token {
     /// # Errors
     /// If the operating system provides no random numbers.
     pub fn generate() -> Result<Self, NoRandomness> {
-        let digits = identity::random_digits::<RANDOM_BYTES>()?;
-        Ok(Self(format!("{PREFIX}{digits}")))
+        let bytes = Zeroizing::new(identity::random_bytes::<RANDOM_BYTES>()?);
+        // Long enough from the beginning: a text that moves leaves a copy behind.
+        let mut text = Zeroizing::new(String::with_capacity(TOKEN_CHARACTERS));
+        text.push_str(PREFIX);
+        let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
+        text.extend(digits.filter_map(|digit| char::from_digit(u32::from(digit), 16)));
+        Ok(Self(text))
     }
 
     /// Parses a token, without surrounding white space.
@@ -54,7 +61,7 @@ impl Token {
         if text.len() != TOKEN_CHARACTERS || !digits.bytes().all(hexadecimal) {
             return Err(NoToken);
         }
-        Ok(Self(text.to_owned()))
+        Ok(Self(Zeroizing::new(text.to_owned())))
     }
 
     /// Returns the token's hash.

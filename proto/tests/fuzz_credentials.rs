@@ -62,7 +62,7 @@ fn check_file(bytes: &[u8]) -> (bool, bool) {
     let token = bounded(bytes.len(), || credential_file::token(&path));
     let are = (identity.is_ok(), token.is_ok());
     match identity {
-        Ok(identity) => assert!(!identity.chain.is_empty()),
+        Ok(identity) => assert!(!identity.cert.is_empty()),
         Err(error) => check_error(error),
     }
     match token {

@@ -5,6 +5,8 @@
 //! function here holds the interpreter while it computes, and none panics: what a computation's panic
 //! would be is an exception.
 
+#![forbid(unsafe_code)]
+
 mod case;
 mod ensemble;
 mod errors;

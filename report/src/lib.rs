@@ -4,6 +4,8 @@
 //! [`report`] is a function from parsed results to texts; nothing here reads or writes a file. The same
 //! results give the same bytes: there is no time, machine or path in a report, and no order by chance.
 
+#![forbid(unsafe_code)]
+
 mod chart;
 mod course;
 mod figures;

@@ -7,6 +7,8 @@
 //! worker, a clock or a file: a search is a function of its specification and of the outcomes
 //! passed to it.
 
+#![forbid(unsafe_code)]
+
 mod expected;
 mod identify;
 pub mod newton;

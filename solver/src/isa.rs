@@ -5,6 +5,11 @@
 //! whose results do not depend on how many lanes fit into a register. Without hardware support a
 //! fused multiply-add is a slow but exact function call.
 
+#![expect(
+    unsafe_code,
+    reason = "a kernel is called for an instruction set that was found to be there"
+)]
+
 use std::ffi::OsString;
 
 use thiserror::Error;

@@ -4,6 +4,11 @@
 //! interact and every operation is one IEEE operation or one explicit fused multiply-add, so the
 //! bits of each lane are those of a scalar computation, whatever the width.
 
+#![expect(
+    unsafe_code,
+    reason = "registers are the processor's own, with instructions that the compiler does not choose by itself"
+)]
+
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 
 /// A register of `WIDTH` numbers; `WIDTH` divides [`LANES`].

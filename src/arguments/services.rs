@@ -157,8 +157,8 @@ fn only_tcp(text: &str, reader: &str) -> Result<SocketAddr, String> {
     }
 }
 
-fn host_name(text: &str) -> Result<String, String> {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '.';
+pub(super) fn host_name(text: &str) -> Result<String, String> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
     if text.is_empty() || text.len() > HOST_NAME_BYTES_MAX || !text.chars().all(allowed) {
         return Err(
             "it must be the name of a host without a port, such as bones.example.org".to_owned()

@@ -5,6 +5,7 @@ use std::net::IpAddr;
 use clap::Args;
 use osteon_proto::endpoint::Endpoint;
 
+use super::services::host_name;
 use super::{CredentialArguments, JobFileArguments};
 
 /// Arguments of `umbridge`.
@@ -20,6 +21,10 @@ pub(crate) struct UmbridgeArguments {
     /// and no access control
     #[arg(long, value_name = "IP", default_value = "127.0.0.1")]
     pub(crate) address: IpAddr,
+    /// Answer requests that name this host, too, e.g. that of a container or a proxy; can be repeated.
+    /// Addresses, localhost and the name of this machine are always answered
+    #[arg(long, value_name = "NAME", value_parser = host_name)]
+    pub(crate) http_host: Vec<String>,
     /// Number of worker processes to start on this machine [default: 2]
     #[arg(long, value_name = "N", conflicts_with = "coordinator",
           value_parser = clap::value_parser!(u32).range(1..=256))]

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint;
+use osteon_proto::endpoint::{self, ConnectError};
 use osteon_proto::malformed::Malformed;
+use osteon_proto::patience::Patience;
 use osteon_proto::v1::backup_response::Part;
 use osteon_proto::v1::{self, BackupEnd, ExplainResponse, ListWorkersResponse, WorkerSnapshot};
-use tokio::time::{Instant, timeout};
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
@@ -54,7 +54,8 @@ impl Client {
             Err(error) => return Ok(Err(error)),
         };
         loop {
-            let Ok(message) = timeout(answer_limit(), stream.message()).await else {
+            let mut patience = Patience::of(answer_limit());
+            let Ok(message) = patience.wait_for(stream.message()).await else {
                 return Ok(Err(self.peer.silent()));
             };
             let part = match message {
@@ -75,16 +76,19 @@ impl Client {
 pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientError> {
     let Remote { endpoint, files, unused, .. } = remote;
     let files = CredentialFiles { token: None, ..files.clone() };
-    let begun = Instant::now();
+    let mut patience = Patience::of(limit);
     let connected = async {
         let credentials = loaded(&files, endpoint).await?;
-        Ok(endpoint::connect_with(endpoint, &credentials, limit).await?)
+        let connected = endpoint::connect_with(endpoint, &credentials, limit);
+        // The connection keeps the limit by itself; what it took is no longer left for the answer.
+        let late =
+            |_| ConnectError::Timeout { endpoint: endpoint.clone(), seconds: limit.as_secs_f64() };
+        Ok(patience.wait_for(connected).await.map_err(late)??)
     };
     let connection =
         connected.await.map_err(|error: ClientError| error.with_unused_variables(unused))?;
     let mut client = HealthClient::new(connection);
     let call = client.check(HealthCheckRequest::default());
-    let left = limit.saturating_sub(begun.elapsed());
-    let answer = Peer::new(remote).answered_within(left, call).await?;
+    let answer = Peer::new(remote).answered_within(&mut patience, call).await?;
     Ok(answer.status() == ServingStatus::Serving)
 }

@@ -5,9 +5,9 @@ use std::pin::pin;
 use std::time::Duration;
 
 use osteon_proto::endpoint::{ConnectError, Endpoint};
+use osteon_proto::patience::Patience;
 use osteon_proto::status::{self, Resource};
 use osteon_proto::tls_failure::TlsFailure;
-use tokio::time::timeout;
 use tonic::{Code, Response, Status};
 
 use crate::environment::Unused;
@@ -38,20 +38,21 @@ impl Peer {
         &mut self,
         call: impl Future<Output = Result<Response<T>, Status>>,
     ) -> Result<T, ClientError> {
-        self.answered_within(answer_limit(), call).await
+        self.answered_within(&mut Patience::of(answer_limit()), call).await
     }
 
-    /// Waits for the answer to `call`, for at most `limit`.
+    /// Waits for the answer to `call`, for as long as there is patience.
     pub(super) async fn answered_within<T>(
         &mut self,
-        limit: Duration,
+        patience: &mut Patience,
         call: impl Future<Output = Result<Response<T>, Status>>,
     ) -> Result<T, ClientError> {
+        let limit = patience.left();
         let notice = || {
             let left = limit.saturating_sub(Duration::from_secs(SILENCE_S_MAX)).as_secs_f64();
             format!("no answer from {} yet; waiting for {left:.0} more seconds", self.endpoint)
         };
-        let answer = with_wait_notice(timeout(limit, call), notice).await;
+        let answer = with_wait_notice(patience.wait_for(call), notice).await;
         let error = match answer {
             Ok(Ok(response)) => {
                 self.ever_answered = true;
@@ -132,7 +133,8 @@ pub(super) async fn with_wait_notice<T>(
     notice: impl Fn() -> String,
 ) -> T {
     let mut call = pin!(call);
-    match timeout(Duration::from_secs(SILENCE_S_MAX), call.as_mut()).await {
+    let silence = Duration::from_secs(SILENCE_S_MAX);
+    match Patience::of(silence).wait_for(call.as_mut()).await {
         Ok(answer) => answer,
         Err(_) => {
             say(&notice());

@@ -9,6 +9,7 @@ use osteon_coordinator::{Config, Coordinator, Listener};
 use osteon_files::job_file;
 use tokio::net::{TcpListener, UnixListener, UnixStream};
 use tokio::sync::Notify;
+use tokio::time::Instant;
 use tonic::Status;
 
 use super::*;

@@ -7,6 +7,7 @@ use osteon_common::visible;
 use osteon_proto::credential_file;
 use osteon_proto::endpoint;
 use time::OffsetDateTime;
+use zeroize::Zeroizing;
 
 use crate::arguments::CertsArguments;
 use crate::certificates::{Authority, CertificateHolder, PemPair};
@@ -61,17 +62,17 @@ fn existing(ca: &Path, directory: &Path) -> Result<(Authority, Vec<NewFile>), Co
     let authority = Authority::from_pem(&text, &secret)
         .with_context(|| format!("{} is not an authority that can sign", certificate.display()))
         .map_err(CommandFailure::BadInput)?;
-    let copy = NewFile { path: directory.join("ca.pem"), text, secret: false };
+    let copy = NewFile { path: directory.join("ca.pem"), text: text.into(), secret: false };
     Ok((authority, vec![copy]))
 }
 
 fn pair(directory: &Path, name: &str, made: PemPair) -> Vec<NewFile> {
-    let file = |suffix: &str, text, secret| NewFile {
+    let file = |suffix: &str, text: Zeroizing<String>, secret| NewFile {
         path: directory.join(format!("{name}{suffix}")),
         text,
         secret,
     };
-    vec![file(".pem", made.certificate, false), file("-key.pem", made.key, true)]
+    vec![file(".pem", made.certificate.into(), false), file("-key.pem", made.key, true)]
 }
 
 fn unmade(error: rcgen::Error) -> CommandFailure {

@@ -45,7 +45,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
             .with_context(|| format!("cannot create the directory {}", directory.display()))
             .map_err(CommandFailure::Failed)?;
     }
-    open_files::raise_limit();
+    open_files::raise_limit().map_err(CommandFailure::failed)?;
     let listener = security.bind(&address, arguments.insecure).await.map_err(bind_failure)?;
     let listener = match arguments.metrics {
         None => listener,

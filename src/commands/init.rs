@@ -42,7 +42,7 @@ pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFail
         stdout.verbatim(&first.text).map_err(stdout_failure)?;
         return Ok(ExitStatus::Done);
     }
-    new_files::create(&[NewFile { path: path.clone(), text: first.text, secret: false }])?;
+    new_files::create(&[NewFile { path: path.clone(), text: first.text.into(), secret: false }])?;
     let mut said = String::new();
     if let Some(csv) = velocities {
         said += &format!("{}\n", visible::path(csv));

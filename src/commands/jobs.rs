@@ -16,6 +16,7 @@ use crate::arguments::JobFileArguments;
 use crate::client::{self, Client, ClientError, Fetched, Remote, SubmitOptions};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
+use crate::progress::say;
 use crate::request_id::RequestId;
 use crate::resolved::OutputFormat;
 use crate::results_directory::ResultsDirectory;
@@ -59,9 +60,12 @@ pub(super) async fn list(
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
     let mut client = Client::connect(coordinator).await?;
-    let jobs = client.list().await?;
+    let (jobs, concerns) = client.list_with_concerns().await?;
     let banned = client.banned().await?;
     output::stdout(format).jobs(&jobs, &banned).map_err(stdout_failure)?;
+    for concern in concerns {
+        say(&format!("the coordinator: {}", visible::line(&concern)));
+    }
     Ok(ExitStatus::Done)
 }
 

@@ -32,7 +32,7 @@ pub(super) async fn observe(
     let observations = computed.map_err(CommandFailure::failed)??;
     if let Some(path) = &out {
         let text = observations.to_csv();
-        new_files::create(&[NewFile { path: path.clone(), text, secret: false }])?;
+        new_files::create(&[NewFile { path: path.clone(), text: text.into(), secret: false }])?;
     }
     let summary = observations.summary();
     let shown = ShownObservations { point: &point, summary: &summary, file: out.as_deref() };

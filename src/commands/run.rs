@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use anyhow::anyhow;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::results::Status;
+use osteon_coordinator::service::open_files;
 use osteon_files::job_file;
 use osteon_files::report::ResultFile;
 use osteon_proto::credentials::CredentialFiles;
@@ -52,7 +53,7 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
         cost::say_if_remarkable(specification, isa, threads).await;
     }
     let mut interruption = pin!(signals::interruption()?);
-    // Connected first, so that an address that does not answer leaves no directory behind.
+    // Done first, so that an address that does not answer, or too low a limit, leaves no directory behind.
     let location = tokio::select! {
         biased;
         found = ConnectedLocation::connect(&run.location) => found?,
@@ -101,6 +102,7 @@ impl ConnectedLocation {
     async fn connect(location: &RunLocation) -> Result<Self, CommandFailure> {
         Ok(match location {
             RunLocation::Local { workers, threads } => {
+                open_files::require_for_run(*workers).map_err(CommandFailure::failed)?;
                 Self::Local { workers: *workers, threads: *threads }
             }
             RunLocation::Coordinator(remote) => {

@@ -3,6 +3,7 @@
 use anyhow::anyhow;
 use osteon_coordinator::access::tokens::{self, Role};
 use osteon_proto::token::Token;
+use zeroize::Zeroizing;
 
 use crate::arguments::TokenArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
@@ -25,7 +26,7 @@ pub(super) fn make(arguments: &TokenArguments) -> Result<ExitStatus, CommandFail
         )));
     }
     let token = Token::generate().map_err(CommandFailure::failed)?;
-    let text = format!("{}\n", token.reveal());
+    let text = Zeroizing::new(format!("{}\n", token.reveal()));
     new_files::create(&[NewFile { path: out.clone(), text, secret: true }])?;
     let line = tokens::line(name, role, &token.hash());
     match list {

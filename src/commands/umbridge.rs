@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use osteon_common::job::JobKind;
+use osteon_coordinator::service::open_files;
 use osteon_files::job_file::{self, FilePurpose};
 use osteon_proto::credentials::CredentialFiles;
 
@@ -26,7 +27,7 @@ const KEPT: Duration = Duration::from_secs(60);
 
 /// Serves until SIGINT or SIGTERM, or until the workers cannot continue. The URL is printed.
 pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFailure> {
-    let ModelService { job, address, location, isa } = service;
+    let ModelService { job, address, hosts, location, isa } = service;
     let input = job.open().map_err(CommandFailure::bad_input)?;
     let kind = match job_file::purpose(&input).map_err(CommandFailure::bad_input)? {
         FilePurpose::Job(kind) => kind,
@@ -47,6 +48,7 @@ pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFa
             remote
         }
         RunLocation::Local { workers, threads } => {
+            open_files::require_for_run(workers).map_err(CommandFailure::failed)?;
             let (store, keep_ended) = (StoreLocation::Memory, Some(KEPT));
             let setup = EmbeddedSetup { store, workers, threads, page: None, keep_ended };
             let started = Embedded::start(setup, Arc::clone(&evaluated)).await?;
@@ -63,7 +65,7 @@ pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFa
         say(&format!("serving {}; Ctrl-C ends it", models.models().join(", ")));
         let url = format!("{}\n", listener.url());
         output::stdout(OutputFormat::Text).verbatim(&url).map_err(stdout_failure)?;
-        Ok::<_, CommandFailure>((router(models), evaluator))
+        Ok::<_, CommandFailure>((router(models, hosts), evaluator))
     };
     let ended = async {
         let (router, evaluator) = served.await?;

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 
 use anyhow::anyhow;
+use osteon_coordinator::OwnHosts;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_solver::Isa;
 
@@ -24,6 +25,8 @@ pub(crate) struct ModelService {
     pub(crate) job: JobFileArguments,
     /// Address to listen on.
     pub(crate) address: SocketAddr,
+    /// Hosts that requests may name.
+    pub(crate) hosts: OwnHosts,
     /// Where points are evaluated.
     pub(crate) location: RunLocation,
     /// The instruction set to compute single cases on.
@@ -37,8 +40,16 @@ pub(super) fn service(
     cores: u32,
     isa: Isa,
 ) -> Result<ModelService, CommandFailure> {
-    let UmbridgeArguments { job, port, address, workers, threads, coordinator, credentials } =
-        arguments;
+    let UmbridgeArguments {
+        job,
+        port,
+        address,
+        http_host,
+        workers,
+        threads,
+        coordinator,
+        credentials,
+    } = arguments;
     let port = match port {
         Some(port) => port,
         None => port_of(std::env::var(PORT_VARIABLE).ok())?,
@@ -46,7 +57,8 @@ pub(super) fn service(
     let files = CredentialFiles::from(credentials);
     let location =
         Locating { workers, threads, coordinator, files }.location(cores, environment)?;
-    Ok(ModelService { job, address: SocketAddr::new(address, port), location, isa })
+    let (address, hosts) = (SocketAddr::new(address, port), OwnHosts::with(http_host));
+    Ok(ModelService { job, address, hosts, location, isa })
 }
 
 /// Returns the port that the environment names; an empty variable counts as unset.

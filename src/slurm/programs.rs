@@ -87,3 +87,25 @@ fn shown(text: &str) -> String {
     let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
     lines.join("; ").chars().take(MESSAGE_CHARS_MAX).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use tokio::time::Instant;
+
+    use super::*;
+
+    /// The clock jumps whenever nothing but it is waited for.
+    #[tokio::test(start_paused = true)]
+    async fn a_program_that_hangs_delays_by_its_time_limit_only() {
+        let begun = Instant::now();
+        let hung = run("sleep", &["600"], "").await.unwrap_err();
+        assert!(matches!(hung, SlurmError::TimedOut { program: "sleep", .. }), "{hung}");
+        assert_eq!(begun.elapsed().as_secs(), RUN_S_MAX);
+    }
+
+    #[tokio::test]
+    async fn a_program_that_has_vanished_delays_nothing() {
+        let gone = run("no-such-program-of-slurm", &[], "").await.unwrap_err();
+        assert!(matches!(gone, SlurmError::NotInstalled { .. }), "{gone}");
+    }
+}

@@ -8,14 +8,17 @@ use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
 use axum::http::header::{CONTENT_TYPE, HeaderName, HeaderValue, RETRY_AFTER};
 use axum::http::{Method, StatusCode, Uri};
+use axum::middleware::from_fn_with_state;
 use axum::response::Response;
 use axum::routing::{get, post};
 use http_body_util::{BodyExt as _, LengthLimitError, Limited};
+use osteon_coordinator::OwnHosts;
 use serde_json::{Value, json};
 use tokio::time::timeout;
 
 use super::derivatives::Differentiated;
 use super::functions::ServedJob;
+use super::gate;
 use super::model::ServedModel;
 use super::protocol_error::{ProtocolError, ProtocolErrorKind, quoted};
 use super::request_config::RequestConfig;
@@ -130,8 +133,8 @@ fn differentiated(
     Ok(Differentiated { served, model, config, input })
 }
 
-/// Returns the endpoints for a job.
-pub(crate) fn router(served: Arc<ServedJob>) -> Router {
+/// Returns the endpoints for a job, behind the gate, which knows `hosts`.
+pub(crate) fn router(served: Arc<ServedJob>, hosts: OwnHosts) -> Router {
     let mut router = Router::new().route("/", get(front)).route("/Info", get(info));
     for operation in Operation::ALL {
         let answered = move |State(served): State<Arc<ServedJob>>, request: Request| async move {
@@ -142,19 +145,28 @@ pub(crate) fn router(served: Arc<ServedJob>) -> Router {
         };
         router = router.route(operation.path(), post(answered));
     }
-    router.fallback(unknown).method_not_allowed_fallback(wrong_method).with_state(served)
+    router
+        .fallback(unknown)
+        .method_not_allowed_fallback(wrong_method)
+        .with_state(served)
+        .layer(from_fn_with_state(hosts, gate::guard))
 }
 
 /// Returns what answers every request while there is no place for its connection.
 pub(super) fn busy(message: String) -> Router {
     let error = ProtocolError::output(message).with_status(StatusCode::SERVICE_UNAVAILABLE);
     Router::new().fallback(async move |request: Request| {
-        // Whoever is still sending would not read the answer.
-        let _ = body(request.into_body(), REFUSED_BODY_S_MAX).await;
-        let mut response = response(Err(error));
+        let mut response = refused(request, error).await;
         response.headers_mut().insert(RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
         response
     })
+}
+
+/// Answers a request with an error.
+pub(super) async fn refused(request: Request, error: ProtocolError) -> Response {
+    // Whoever is still sending would not read the answer.
+    let _ = body(request.into_body(), REFUSED_BODY_S_MAX).await;
+    response(Err(error))
 }
 
 /// For people, and for clients that only look whether there is a server.

@@ -5,6 +5,8 @@
 //! A study is a function of its draws alone: realizations are computed on all cores and processed
 //! in index order, so that its numbers depend neither on threads nor on the instruction set.
 
+#![forbid(unsafe_code)]
+
 pub mod accuracy;
 pub mod continuity;
 pub mod convergence;

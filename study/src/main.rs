@@ -3,6 +3,8 @@
 //! The table goes to stdout, each of its rows to stderr when it is finished. Exit codes: 0 done, 1
 //! failed, 2 bad usage.
 
+#![forbid(unsafe_code)]
+
 mod arguments;
 
 use std::io::Write as _;

@@ -99,6 +99,8 @@ fn on_a_full_disk_jobs_wait_and_go_on_when_there_is_room() {
     for part in ["is not accepted", "no room is left", "make room on its disk"] {
         assert!(refused.stderr.contains(part), "{part} in {refused:?}");
     }
+    let listed = run(&["jobs", "--coordinator", service.url()]);
+    assert!(listed.stderr.contains("the store has refused records for "), "{listed:?}");
 
     // After a kill on the full disk, it comes back with everything that it had acknowledged.
     service.kill();

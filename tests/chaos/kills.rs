@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::fs;
 use std::sync::mpsc;
 
 use osteon_common::job::JobKind;
@@ -304,5 +305,35 @@ impl fmt::Display for Survived {
             self.jobs,
             self.evaluations
         )
+    }
+}
+
+/// A worker is back at once after each restart of its coordinator, however many there were.
+#[test]
+fn a_worker_comes_back_at_once_after_each_restart() {
+    const RESTARTS: usize = 6;
+    let scratch = Scratch::new();
+    let mut service = Service::start(&scratch, &[]);
+    let _worker = service.worker(&scratch);
+    let log = || fs::read_to_string(scratch.path("workers.log")).unwrap_or_default();
+    let attachments = |log: &str| log.matches(" attached").count();
+    for restart in 1..=RESTARTS {
+        eventually("it is attached", || attachments(&log()) == restart);
+        if restart % 2 == 0 {
+            service.kill()
+        } else {
+            service.end()
+        }
+        service.start_again();
+    }
+    eventually("it is back", || attachments(&log()) == RESTARTS + 1);
+    // The first wait after a kill is the shortest: earlier restarts have not made it longer. A coordinator that
+    // ends in order says when to come back.
+    let log = log();
+    for (restart, stay) in (1..).zip(log.split(" attached").skip(1).take(RESTARTS)) {
+        let wait = stay.split("wait_ms=").nth(1).unwrap();
+        let wait: u64 = wait.split(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap();
+        let most = if restart % 2 == 0 { 100 } else { 2000 };
+        assert!(wait <= most, "{wait} ms after restart {restart}: {stay}");
     }
 }

@@ -8,7 +8,10 @@ use osteon_proto::v1::JobSnapshot;
 
 use crate::api::{Api, specification};
 use crate::service::{Service, undisturbed};
-use crate::support::{Owned, Scratch, eventually, job};
+use crate::support::{Owned, Scratch, children, eventually, job, osteon, signal, text};
+
+/// Length of a fault that is longer than a client waits for an answer, 10 s.
+const LONG: Duration = Duration::from_secs(12);
 
 /// A coordinator with two workers in the middle of a job.
 struct Story {
@@ -76,4 +79,50 @@ fn a_coordinator_that_stands_still_for_longer_is_found_again() {
     story.service.process().signal("CONT");
     story.check_end();
     assert!(story.logged(" attached") >= 4);
+}
+
+/// A client and its coordinator stop, as on a laptop whose lid is closed; the client wakes first.
+#[test]
+fn a_client_that_stands_still_goes_on_waiting() {
+    let scratch = Scratch::new();
+    let mut service = Service::start(&scratch, &[]);
+    let log = scratch.path("client.log");
+    let said = || fs::read_to_string(&log).unwrap();
+    service.process().signal("STOP");
+    let mut command = osteon();
+    command.args(["jobs", "--coordinator", service.url(), "--json"]);
+    let mut client = Owned::spawn_logging(&mut command, &log);
+    eventually("it waits for an answer", || said().contains("no answer from"));
+    client.signal("STOP");
+    std::thread::sleep(LONG);
+    client.signal("CONT");
+    let waits = || fs::read_to_string(format!("/proc/{}/stat", client.id())).unwrap();
+    eventually("it runs again", || !waits().contains(") T "));
+    service.process().signal("CONT");
+    assert_eq!(client.code(), Some(0), "{}", said());
+    service.end();
+}
+
+/// A whole run stops, with its workers, in the middle of its job.
+#[test]
+fn a_run_that_stands_still_goes_on() {
+    let scratch = Scratch::new();
+    let file = scratch.write("job.toml", &job(50, 30));
+    let digest = undisturbed("identify", &file);
+    let (out, log) = (scratch.path("out"), scratch.path("run.log"));
+    let said = || fs::read_to_string(&log).unwrap();
+    let mut command = osteon();
+    command.args(["identify", text(&file), "--out", text(&out), "--workers", "2", "-v"]);
+    let mut run = Owned::spawn_logging(&mut command, &log);
+    eventually("some points are evaluated", || said().matches("cost").count() > 3);
+    let all = [vec![run.id()], children(run.id())].concat();
+    assert_eq!(all.len(), 3);
+    all.iter().for_each(|process| signal(*process, "STOP"));
+    assert!(!out.join("result.json").exists());
+    std::thread::sleep(LONG);
+    all.iter().for_each(|process| signal(*process, "CONT"));
+    assert_eq!(run.code(), Some(0), "{}", said());
+    let written = fs::read_to_string(out.join("result.json")).unwrap();
+    assert!(written.contains(&digest), "{written}");
+    assert!(!said().contains("starting another"), "{}", said());
 }

@@ -12,6 +12,8 @@
 //! A worker holds nothing worth keeping: if it dies, its batches are computed elsewhere, to the
 //! same bits.
 
+#![forbid(unsafe_code)]
+
 mod backend;
 mod backoff;
 mod batch_spans;

@@ -170,6 +170,10 @@ impl Worker {
                 End::Lost(reason) => (reason, None),
                 End::Deferred(reason, delay) => (reason, Some(delay)),
             };
+            // Noted here, too: the stream may have ended while this process stood still.
+            if self.state.is_attached() {
+                self.last_attached = Instant::now();
+            }
             if let Some(End::Left) = self.apply(Event::Lost, None)? {
                 return Ok(());
             }
@@ -231,9 +235,6 @@ impl Worker {
         loop {
             let was_attached = self.state.is_attached();
             let was_draining = self.state.is_draining();
-            if was_attached {
-                self.last_attached = Instant::now();
-            }
             let event = tokio::select! {
                 // The order matters: finished batches are sent before anything else is handled.
                 biased;
@@ -250,6 +251,10 @@ impl Worker {
                 }
                 _ = ticks.tick() => Event::Tick,
             };
+            // After the wait: time in which this process stood still does not count as time without a lease.
+            if was_attached {
+                self.last_attached = Instant::now();
+            }
             let ended = self.apply(event, Some(&outbox))?;
             if !was_draining && self.state.is_draining() {
                 let by = self.drained_by(draining);

@@ -1,5 +1,7 @@
 //! All developer commands: `cargo xtask COMMAND`. CI calls `cargo xtask ci`.
 
+#![forbid(unsafe_code)]
+
 mod book;
 mod chaos;
 mod deny;

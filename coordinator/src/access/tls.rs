@@ -13,6 +13,7 @@ use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::pki_types::{CertificateDer, UnixTime};
 use tokio_rustls::rustls::server::danger::{ClientCertVerified, ClientCertVerifier};
 use tokio_rustls::rustls::server::{VerifierBuilderError, WebPkiClientVerifier};
+use tokio_rustls::rustls::sign::SingleCertAndKey;
 use tokio_rustls::rustls::version::TLS13;
 use tokio_rustls::rustls::{
     self, DigitallySignedStruct, DistinguishedName, ServerConfig, SignatureScheme,
@@ -77,8 +78,8 @@ impl Tls {
     pub fn load(files: &TlsFiles) -> Result<Self, TlsError> {
         let setup = |source| TlsError::Setup { source };
         let provider = Arc::new(ring::default_provider());
-        let identity = credential_file::identity(&files.certificate, &files.key)?;
-        let host = identity.chain.first().and_then(host_name);
+        let identity = Arc::new(credential_file::identity(&files.certificate, &files.key)?);
+        let host = identity.cert.first().and_then(host_name);
         let roots = Arc::new(credentials::roots(&files.ca)?);
         let verifier: Arc<dyn ClientCertVerifier> =
             WebPkiClientVerifier::builder_with_provider(roots, Arc::clone(&provider))
@@ -90,15 +91,13 @@ impl Tls {
             .with_protocol_versions(&[&TLS13])
             .map_err(setup)?
             .with_no_client_auth()
-            .with_single_cert(identity.chain.clone(), identity.key.clone_key())
-            .map_err(setup)?;
+            .with_cert_resolver(Arc::new(SingleCertAndKey::from(Arc::clone(&identity))));
         pages.alpn_protocols = vec![PAGES_ALPN.to_vec()];
         let mut config = ServerConfig::builder_with_provider(provider)
             .with_protocol_versions(&[&TLS13])
             .map_err(setup)?
             .with_client_cert_verifier(Arc::new(LateVerifier(Arc::clone(&verifier))))
-            .with_single_cert(identity.chain, identity.key)
-            .map_err(setup)?;
+            .with_cert_resolver(Arc::new(SingleCertAndKey::from(identity)));
         config.alpn_protocols = vec![ALPN.to_vec()];
         let [acceptor, pages] = [config, pages].map(|config| TlsAcceptor::from(Arc::new(config)));
         Ok(Self { acceptor, pages, verifier, host })

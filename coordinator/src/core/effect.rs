@@ -212,6 +212,8 @@ pub enum Answer {
         /// Last job of the page, if there are more.
         more_after: Option<JobId>,
     },
+    /// What an operator should know, as sentences.
+    Concerns(Vec<String>),
     /// The search of a job that has not ended.
     Followed(SearchRows),
     /// The job has ended; its output is in the store.
@@ -292,13 +294,27 @@ pub enum Refusal {
         /// The job it belongs to.
         job: JobId,
     },
-    /// Too many jobs are waiting or running.
+    /// Too many jobs of all clients are waiting or running.
     #[error(
-        "{limit} jobs wait or run already, the most allowed; submit again when some have ended"
+        "{limit} jobs of all clients wait or run already, the most allowed; submit again when some have \
+         ended"
     )]
     TooManyJobs {
         /// Maximum number of jobs.
         limit: usize,
+    },
+    /// Too many jobs of one client are waiting or running.
+    #[error(
+        "{limit} jobs of the client {client:?} wait or run already, the most that one client may have of \
+         the {all} of all; submit again when some have ended, or cancel some"
+    )]
+    ClientHasTooManyJobs {
+        /// Name of the client.
+        client: String,
+        /// Maximum number of jobs of one client.
+        limit: usize,
+        /// Maximum number of jobs of all clients.
+        all: usize,
     },
     /// The specifications of the jobs that are waiting or running are too large together.
     #[error(

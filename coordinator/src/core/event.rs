@@ -119,6 +119,20 @@ pub enum Event {
         /// What is stored of it; `None` if there is no such job. Or error text for people.
         outcome: Result<Option<StoredJob>, String>,
     },
+    /// The number of connections of clients and workers has changed.
+    Connections {
+        /// Open connections.
+        open: u64,
+        /// Their maximum number.
+        most: u64,
+    },
+    /// The store's log is copied into the database.
+    LogCopied,
+    /// The store's log could not be copied into the database, or not all of it.
+    LogStuck {
+        /// Its length, bytes.
+        bytes: u64,
+    },
     /// The coordinator shall stop.
     Drain,
 }
@@ -153,6 +167,8 @@ pub enum Request {
     },
     /// Get a snapshot of a job.
     Get(JobId),
+    /// What an operator should know, for people.
+    Concerns,
     /// Explain what decides how fast a job is.
     Explain(JobId),
     /// List snapshots of the jobs after a given one, oldest first.

@@ -39,8 +39,25 @@ id! {
 }
 
 impl JobId {
-    /// Parses the identifier of a job from a user's text; `None` if it cannot be one.
+    /// Parses the identifier of a job from a user's text; `None` if it cannot be one. A job has one identifier: with
+    /// a sign or with zeros in front it is not that.
     pub fn parse(text: &str) -> Option<Self> {
-        text.parse().ok().map(Self)
+        let id: u64 = text.parse().ok()?;
+        (id.to_string() == text).then_some(Self(id))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_has_one_identifier() {
+        for (text, id) in [("1", 1), ("0", 0), ("18446744073709551615", u64::MAX)] {
+            assert_eq!(JobId::parse(text), Some(JobId(id)), "{text}");
+        }
+        for text in ["", "01", "+1", "-1", " 1", "1 ", "1.0", "00", "18446744073709551616", "一"] {
+            assert_eq!(JobId::parse(text), None, "{text}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::job::{Data, Group, JobKind, JobSpecification, VelocitySet};
 use osteon_common::parameters::Point;
 use osteon_proto::specification;
 use prost::Message as _;
@@ -29,6 +29,8 @@ pub(crate) struct Job {
     pub(crate) identity: SpecificationDigest,
     /// What its workers prove that they compute rightly.
     pub(crate) setup: SetupKey,
+    /// Approximate memory of its specification, bytes.
+    pub(crate) bytes: u64,
     pub(crate) stage: Stage,
     pub(crate) search: Search,
     /// Evaluations of points that its search will ask for when it comes to other groups and starts.
@@ -82,6 +84,7 @@ impl Job {
         Self {
             identity: identity(&record.specification),
             setup: SetupKey::of(&record.specification),
+            bytes: bytes(&record.specification),
             search: Search::new(record.specification.clone()),
             ahead: Ahead::default(),
             speculation: Speculation::default(),
@@ -267,6 +270,21 @@ pub(crate) struct Speculation {
     pub(crate) candidates: Vec<Point>,
     /// Evaluations of candidates that have begun, in the order of their beginning.
     pub(crate) evaluations: Vec<PendingEvaluation>,
+}
+
+/// Returns the approximate memory of a specification, bytes.
+pub(crate) fn bytes(specification: &JobSpecification) -> u64 {
+    let of_data = |data: &Data| {
+        let names: usize =
+            data.groups().iter().map(|group| size_of::<Group>() + group.name.len()).sum();
+        let of_set = |set: VelocitySet<'_>| {
+            size_of_val(set.velocities) + set.subjects.map_or(0, size_of_val)
+        };
+        let sets: usize = (0..data.sets()).filter_map(|set| data.set(set)).map(of_set).sum();
+        names + sets
+    };
+    let data = specification.data.as_ref().map_or(0, of_data);
+    (size_of::<JobSpecification>() + data) as u64
 }
 
 /// A refusal of the store.

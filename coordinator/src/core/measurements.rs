@@ -8,6 +8,7 @@ use osteon_proto::v1::WorkerState;
 
 use crate::core::job::{Job, Stage};
 use crate::core::reactor::realizations_held;
+use crate::core::service_condition::Bounded;
 use crate::core::state::{AttachedWorker, State};
 use crate::core::worker_list;
 
@@ -41,6 +42,11 @@ pub(crate) struct StateMeasurements {
     pub(crate) oldest_batch: Duration,
     /// Time since which the store has refused a record.
     pub(crate) store_refusing: Duration,
+    /// Time since which the store's log could not be copied into the database, and its length, bytes.
+    pub(crate) log_stuck: Duration,
+    pub(crate) log_stuck_bytes: u64,
+    /// Used part of each bound, 0 to 1.
+    pub(crate) bounds_used: Vec<(Bounded, f64)>,
 }
 
 impl StateMeasurements {
@@ -55,6 +61,9 @@ impl StateMeasurements {
             batches_in_flight: state.batches.len() as u64,
             oldest_batch: since(state.batches.values().map(|batch| batch.sent).min()),
             store_refusing: since(refused_since(state)),
+            log_stuck: since(state.condition.stuck_log.map(|stuck| stuck.since)),
+            log_stuck_bytes: state.condition.stuck_log.map_or(0, |stuck| stuck.bytes),
+            bounds_used: Bounded::ALL.map(|what| (what, used_part(what, state))).to_vec(),
             ..Self::default()
         };
         for job in state.jobs.values() {
@@ -95,6 +104,12 @@ impl StateMeasurements {
             WorkerState::Probation => &mut self.workers_on_probation,
         } += 1;
     }
+}
+
+/// Returns the used part of a bound.
+fn used_part(what: Bounded, state: &State) -> f64 {
+    let (used, most) = what.used(state);
+    used as f64 / most.max(1) as f64
 }
 
 /// Returns the number of slots that a job could keep busy. A search counts with all realizations of

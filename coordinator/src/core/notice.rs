@@ -80,6 +80,11 @@ pub enum Notice {
         /// Time since its acceptance.
         elapsed: Duration,
     },
+    /// Something may soon be refused, or is already.
+    Concern {
+        /// A sentence.
+        text: String,
+    },
 }
 
 /// Reason why a worker departed.
@@ -143,6 +148,7 @@ impl Notice {
             Self::JobStarted { job, stored } => tracing::info!(
                 %job, stored_evaluations = stored, "job started"
             ),
+            Self::Concern { text } => tracing::warn!("{text}"),
             Self::JobEnded { job, client, kind, ending, evaluations, elapsed } => tracing::info!(
                 %job, user = client.as_str(), kind = kind_name(*kind), status = ending.status.name(),
                 reason = ending.reason.as_deref().unwrap_or_default(), evaluations,

@@ -41,7 +41,8 @@ mod tests;
 pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
     let mut turn = Turn::new(state, now);
     // A heartbeat makes no worker free, and heartbeats are frequent.
-    let frees = !matches!(event, Event::Heartbeat { .. });
+    let frees = !matches!(event, Event::Heartbeat { .. } | Event::Connections { .. });
+    turn.state.condition.note(&event, turn.now);
     apply(&mut turn, event);
     if frees {
         dispatch::dispatch(&mut turn);
@@ -80,6 +81,8 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::Reopened { reply_id, job, outcome } => {
             recheck::reopened(turn, reply_id, job, outcome)
         }
+        // Noted for all events.
+        Event::Connections { .. } | Event::LogCopied | Event::LogStuck { .. } => {}
         Event::Drain => {
             ticks::save_parts(turn, true);
             workers::drain_all(turn);
@@ -103,4 +106,5 @@ fn tick(turn: &mut Turn) {
         prune::tick(turn);
     }
     ticks::publish(turn);
+    ticks::tell_concerns(turn);
 }

@@ -26,6 +26,7 @@ use crate::core::notice::Departure;
 use crate::core::probation::Probation;
 use crate::core::proofs::{Proofs, SetupKey};
 use crate::core::rate::Rate;
+use crate::core::service_condition::ServiceCondition;
 use crate::core::service_order::ServiceOrder;
 use crate::core::worker_name::WorkerName;
 use crate::store::{BanRecord, JobRecord};
@@ -100,6 +101,8 @@ pub struct State {
     pub(crate) overdue: BTreeSet<BatchId>,
     /// Delay of the answers of all workers.
     pub(crate) delay: AnswerDelay,
+    /// What it was told of its surroundings.
+    pub(crate) condition: ServiceCondition,
     pub(crate) next_job: u64,
     pub(crate) next_lease: u64,
     pub(crate) next_batch: u64,
@@ -225,6 +228,7 @@ impl State {
             fleet_changes: 0,
             overdue: BTreeSet::new(),
             delay: AnswerDelay::default(),
+            condition: ServiceCondition::default(),
             next_job: 1,
             next_lease: 1,
             next_batch: 1,

@@ -165,6 +165,7 @@ impl EventTally {
             Notice::JobStarted { job, .. } => {
                 self.evaluating.insert(*job, now);
             }
+            Notice::Concern { .. } => {}
             Notice::JobEnded { job, ending, .. } => {
                 self.evaluating.remove(job);
                 if let Some(place) = Status::ALL.iter().position(|it| *it == ending.status) {

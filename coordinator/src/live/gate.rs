@@ -2,15 +2,13 @@
 //! and since browsers also carry out the requests of other pages, a request must come from the page
 //! itself, and name a host that cannot be another's.
 
-use std::net::IpAddr;
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
-use axum::http::header::{AUTHORIZATION, HOST, HeaderName, ORIGIN};
-use axum::http::{HeaderMap, HeaderValue, Method, StatusCode};
+use axum::http::header::AUTHORIZATION;
+use axum::http::{HeaderValue, StatusCode};
 use axum::middleware::Next;
 use axum::response::Response;
-use osteon_proto::identity::host_name;
 use thiserror::Error;
 use tokio::sync::watch;
 use tonic::Status;
@@ -20,9 +18,7 @@ use crate::access::{
 };
 use crate::live::assets;
 use crate::live::json;
-
-/// Where a request comes from, as the browser says.
-const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
+use crate::live::other_pages::{OwnHosts, host_of, is_cross_site};
 
 /// Path of the requirement to cancel jobs.
 const CANCEL: &str = "/data/jobs/0/cancel";
@@ -33,7 +29,7 @@ pub(crate) struct Gate {
     /// Read for each request, because it may be replaced while the coordinator runs.
     policy: watch::Receiver<Arc<Policy>>,
     /// Names under which the page may be asked for where there are no tokens.
-    hosts: Arc<Vec<String>>,
+    hosts: OwnHosts,
 }
 
 /// Why a request is not answered.
@@ -76,10 +72,8 @@ impl PageCaller {
 }
 
 impl Gate {
-    pub(crate) fn new(policy: watch::Receiver<Arc<Policy>>, mut hosts: Vec<String>) -> Self {
-        hosts.push("localhost".to_owned());
-        hosts.extend(host_name());
-        Self { policy, hosts: Arc::new(hosts) }
+    pub(crate) fn new(policy: watch::Receiver<Arc<Policy>>, hosts: Vec<String>) -> Self {
+        Self { policy, hosts: OwnHosts::with(hosts) }
     }
 
     fn decide(
@@ -102,11 +96,10 @@ impl Gate {
         request: &axum::http::Request<B>,
     ) -> Result<Option<HolderName>, GateRefusal> {
         let (headers, need) = (request.headers(), page_need(request.uri().path()));
-        let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-        let host = text(HOST).or_else(|| Some(request.uri().authority()?.as_str())).unwrap_or("");
+        let host = host_of(request).unwrap_or("");
         // With tokens, a page under another name has none: browsers keep them by origin.
         let open = matches!(**self.policy.borrow(), Policy::Everybody);
-        if open && !self.is_own(host) {
+        if open && !self.hosts.contain(host) {
             return Err(GateRefusal::UnknownHost { host: host.to_owned() });
         }
         // Anybody may link to the page itself.
@@ -114,16 +107,6 @@ impl Gate {
             return Err(GateRefusal::CrossSite);
         }
         Ok(self.decide(headers.get(AUTHORIZATION), need)?)
-    }
-
-    /// Returns whether a host is an address, or a name that leads nowhere else. Any other name may belong
-    /// to somebody who lets it lead to this machine, so that browsers take his page for this one's.
-    fn is_own(&self, host: &str) -> bool {
-        let name = without_port(host);
-        let address =
-            name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name);
-        address.parse::<IpAddr>().is_ok()
-            || self.hosts.iter().any(|known| known.eq_ignore_ascii_case(name))
     }
 }
 
@@ -154,29 +137,6 @@ fn refused(refusal: &GateRefusal) -> Response {
             json::error(StatusCode::MISDIRECTED_REQUEST, &refusal.to_string())
         }
         GateRefusal::CrossSite => json::error(StatusCode::FORBIDDEN, &refusal.to_string()),
-    }
-}
-
-/// Returns whether another page had the browser send a request. Programs send neither header.
-fn is_cross_site(headers: &HeaderMap, method: &Method, host: &str) -> bool {
-    match headers.get(SEC_FETCH_SITE).map(HeaderValue::as_bytes) {
-        Some(b"same-origin") => false,
-        // Typed by the user; only a page posts.
-        Some(b"none") => ![Method::GET, Method::HEAD].contains(method),
-        Some(_) => true,
-        None => headers.get(ORIGIN).is_some_and(|origin| {
-            let origin = origin.to_str().ok().and_then(|origin| origin.split_once("://"));
-            origin.is_none_or(|(_, authority)| !authority.eq_ignore_ascii_case(host))
-        }),
-    }
-}
-
-/// Returns a host without its port.
-fn without_port(host: &str) -> &str {
-    match host.rsplit_once(':') {
-        // The colons of an address are in brackets.
-        Some((name, port)) if !port.contains(']') => name,
-        _ => host,
     }
 }
 

@@ -31,6 +31,7 @@ pub(crate) async fn newest(source: &PageSource) -> Result<Arc<str>, Status> {
 
 async fn value(source: &PageSource) -> Result<Value, Status> {
     let (report, core_queue) = source.measure().await?;
+    let concerns = source.concerns().await?;
     let (state, counts) = (&report.state, &report.counts);
     let mut workers = json::workers(&source.workers().await?);
     for (name, count) in [
@@ -61,6 +62,7 @@ async fn value(source: &PageSource) -> Result<Value, Status> {
         "workers": workers,
         "realizations": { "succeeded": succeeded, "failed": json::counts(failures) },
         "mismatches": counts.mismatches,
+        "concerns": concerns,
         "store": {
             "refusing_s": state.store_refusing.as_secs(),
             "queue": report.store_queue,

@@ -115,6 +115,11 @@ impl PageSource {
         Ok((snapshot, within(explained).await?.into_inner()))
     }
 
+    /// Returns what an operator should know.
+    pub(crate) async fn concerns(&self) -> Result<Vec<String>, Status> {
+        within(self.jobs.concerns()).await
+    }
+
     /// Cancels a job for the holder of a token.
     pub(crate) async fn cancel(
         &self,

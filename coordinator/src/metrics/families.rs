@@ -51,6 +51,7 @@ pub(crate) enum Values {
 /// Returns all metrics in the order in which they are exported.
 pub(crate) fn families(scrape: &Scrape) -> Vec<MetricFamily> {
     let mut all = of_state(&scrape.state);
+    all.extend(of_limits(&scrape.state));
     all.extend(of_work(&scrape.counts));
     all.extend(of_workers(&scrape.counts));
     all.extend(of_coordinator(scrape));
@@ -117,11 +118,39 @@ fn of_state(state: &StateMeasurements) -> Vec<MetricFamily> {
             "Time since the oldest batch in flight was sent; 0 without one",
             state.oldest_batch.as_secs_f64(),
         ),
+    ]
+}
+
+/// The used parts of all hard bounds.
+fn bounds_used(state: &StateMeasurements) -> MetricFamily {
+    let used = state.bounds_used.iter();
+    let values = used.map(|(what, part)| (Some(("bound", what.name())), *part)).collect();
+    MetricFamily {
+        name: "osteon_bound_used_ratio",
+        help: "Used part of what is allowed; at 1 more is refused, or has to wait",
+        values: Values::Gauge(values),
+    }
+}
+
+/// Gauges of the store and of all hard bounds.
+fn of_limits(state: &StateMeasurements) -> Vec<MetricFamily> {
+    vec![
         gauge(
             "osteon_store_refusing_seconds",
             "Time for which the store has refused a record; 0 if it accepts them",
             state.store_refusing.as_secs_f64(),
         ),
+        gauge(
+            "osteon_store_log_stuck_seconds",
+            "Time for which the store's log could not be copied into its database; 0 if it could",
+            state.log_stuck.as_secs_f64(),
+        ),
+        gauge(
+            "osteon_store_log_stuck_bytes",
+            "Length of a log that could not be copied; 0 if it could",
+            state.log_stuck_bytes as f64,
+        ),
+        bounds_used(state),
     ]
 }
 

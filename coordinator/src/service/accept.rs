@@ -2,8 +2,8 @@
 
 use std::io;
 use std::pin::Pin;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
@@ -20,6 +20,7 @@ use tonic::transport::server::Connected;
 
 use crate::access::Certificate;
 use crate::access::tls::Tls;
+use crate::service::control_frames::{ControlFrames, TooManyControlFrames};
 use crate::service::open_files;
 
 /// Time limit for a peer's handshake, and again for its first bytes.
@@ -27,7 +28,7 @@ pub(crate) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Pause after the operating system failed to accept a connection, e.g. because too many files are
 /// open.
 const REFUSED_WAIT: Duration = Duration::from_millis(100);
-/// Minimum time between two log lines about such failures.
+/// Minimum time between two log lines about such failures, or about peers whose connections were ended.
 const COMPLAINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A bound socket.
@@ -43,6 +44,8 @@ pub(crate) struct AcceptedConnection {
     number: u64,
     io: Io,
     certificate: Certificate,
+    /// Counts the peer's control frames; `None` for browsers, which do not speak HTTP/2 here.
+    frames: Option<ControlFrames>,
     /// Time limit for the first byte; `None` once it has arrived.
     patience: Option<Pin<Box<Sleep>>>,
     /// Permit, one of [`open_files::connections_max`].
@@ -67,12 +70,37 @@ type Plain = Either<TcpStream, UnixStream>;
 pub(crate) fn connections(
     bound: BoundSocket,
     tls: Option<watch::Receiver<Tls>>,
+    places: Places,
 ) -> impl Stream<Item = io::Result<AcceptedConnection>> {
-    let acceptor = Acceptor::new(bound, tls, open_files::connections_max());
+    let acceptor = Acceptor::new(bound, tls, places);
     stream::unfold(acceptor, |mut acceptor| async {
         let connection = acceptor.next().await;
         Some((Ok(connection), acceptor))
     })
+}
+
+/// The places of the connections of one listener.
+#[derive(Debug, Clone)]
+pub(crate) struct Places {
+    free: Arc<Semaphore>,
+    most: usize,
+}
+
+impl Places {
+    /// Returns the places of a coordinator, as many as open files allow.
+    pub(crate) fn of_coordinator() -> Self {
+        Self::new(open_files::connections_max())
+    }
+
+    fn new(most: usize) -> Self {
+        Self { free: Arc::new(Semaphore::new(most)), most }
+    }
+
+    /// Returns how many are taken, and how many there are.
+    pub(crate) fn taken(&self) -> (u64, u64) {
+        let taken = self.most.saturating_sub(self.free.available_permits());
+        (taken as u64, self.most as u64)
+    }
 }
 
 /// Accepts connections of one listener.
@@ -80,7 +108,7 @@ pub(crate) struct Acceptor {
     bound: BoundSocket,
     /// Read for each connection, because it may be replaced while the coordinator runs.
     tls: Option<watch::Receiver<Tls>>,
-    places: Arc<Semaphore>,
+    places: Places,
     handshakes: JoinSet<Option<AcceptedConnection>>,
     /// Time of the last log line about failures to accept connections.
     complaint: Option<Instant>,
@@ -89,15 +117,8 @@ pub(crate) struct Acceptor {
 }
 
 impl Acceptor {
-    fn new(bound: BoundSocket, tls: Option<watch::Receiver<Tls>>, most: usize) -> Self {
-        Self {
-            bound,
-            tls,
-            places: Arc::new(Semaphore::new(most)),
-            handshakes: JoinSet::new(),
-            complaint: None,
-            is_of_pages: false,
-        }
+    fn new(bound: BoundSocket, tls: Option<watch::Receiver<Tls>>, places: Places) -> Self {
+        Self { bound, tls, places, handshakes: JoinSet::new(), complaint: None, is_of_pages: false }
     }
 
     /// Returns an acceptor of at most `most` connections of browsers at a time.
@@ -106,7 +127,7 @@ impl Acceptor {
         tls: Option<watch::Receiver<Tls>>,
         most: usize,
     ) -> Self {
-        Self { is_of_pages: true, ..Self::new(BoundSocket::Tcp(listener), tls, most) }
+        Self { is_of_pages: true, ..Self::new(BoundSocket::Tcp(listener), tls, Places::new(most)) }
     }
 
     /// Returns the next connection.
@@ -118,7 +139,7 @@ impl Acceptor {
                         return connection;
                     }
                 }
-                accepted = accept(&self.bound, &self.places),
+                accepted = accept(&self.bound, &self.places.free),
                     if self.handshakes.len() < HANDSHAKES_MAX =>
                 {
                     let (io, place) = match accepted {
@@ -137,7 +158,8 @@ impl Acceptor {
                         }
                         (_, plain) => {
                             let io = Either::Right(plain);
-                            return AcceptedConnection::new(io, Certificate::Absent, place);
+                            let frames = (!self.is_of_pages).then(ControlFrames::new);
+                            return AcceptedConnection::new(io, frames, Certificate::Absent, place);
                         }
                     }
                 }
@@ -184,7 +206,9 @@ async fn handshake(
     match timeout(HANDSHAKE_TIMEOUT, acceptor.accept(stream)).await {
         Ok(Ok(stream)) => {
             let certificate = tls.certificate(stream.get_ref().1.peer_certificates());
-            Some(AcceptedConnection::new(Either::Left(Box::new(stream)), certificate, place))
+            let frames = (!is_of_pages).then(ControlFrames::new);
+            let io = Either::Left(Box::new(stream));
+            Some(AcceptedConnection::new(io, frames, certificate, place))
         }
         Ok(Err(error)) => {
             tracing::debug!(?peer, %error, "a TLS handshake failed");
@@ -198,11 +222,42 @@ async fn handshake(
 }
 
 impl AcceptedConnection {
-    fn new(io: Io, certificate: Certificate, place: OwnedSemaphorePermit) -> Self {
+    fn new(
+        io: Io,
+        frames: Option<ControlFrames>,
+        certificate: Certificate,
+        place: OwnedSemaphorePermit,
+    ) -> Self {
         static LAST: AtomicU64 = AtomicU64::new(0);
         let number = LAST.fetch_add(1, Ordering::Relaxed) + 1;
         let patience = Some(Box::pin(sleep(HANDSHAKE_TIMEOUT)));
-        Self { number, io, certificate, patience, _place: place }
+        Self { number, io, certificate, frames, patience, _place: place }
+    }
+
+    /// Looks at what the peer has sent; an error ends the connection.
+    fn inspect(&mut self, arrived: &[u8]) -> io::Result<()> {
+        let Some(frames) = &mut self.frames else { return Ok(()) };
+        frames.arrived(arrived).map_err(|error| {
+            tell_of_flood(self.number, &error);
+            io::Error::new(io::ErrorKind::ConnectionAborted, error)
+        })
+    }
+
+    /// Notes what was sent to the peer.
+    fn note_sent(&mut self, written: &Poll<io::Result<usize>>) {
+        if let (Some(frames), Poll::Ready(Ok(bytes))) = (&mut self.frames, written) {
+            frames.sent(*bytes);
+        }
+    }
+}
+
+/// Logs the end of a connection that sent too many control frames, at most once per interval: there may be many.
+fn tell_of_flood(connection: u64, error: &TooManyControlFrames) {
+    static LAST: Mutex<Option<Instant>> = Mutex::new(None);
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if last.is_none_or(|last| last.elapsed() >= COMPLAINT_INTERVAL) {
+        *last = Some(Instant::now());
+        tracing::warn!(connection, %error, "a connection is ended (logged at most once a minute)");
     }
 }
 
@@ -226,7 +281,7 @@ impl AsyncRead for AcceptedConnection {
                 if buffer.filled().len() > before {
                     self.patience = None;
                 }
-                Poll::Ready(read)
+                Poll::Ready(read.and_then(|()| self.inspect(&buffer.filled()[before..])))
             }
             Poll::Pending => {
                 if let Some(patience) = &mut self.patience {
@@ -245,7 +300,9 @@ impl AsyncWrite for AcceptedConnection {
         cx: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.io).poll_write(cx, bytes)
+        let written = Pin::new(&mut self.io).poll_write(cx, bytes);
+        self.note_sent(&written);
+        written
     }
 
     fn poll_write_vectored(
@@ -253,7 +310,9 @@ impl AsyncWrite for AcceptedConnection {
         cx: &mut Context<'_>,
         slices: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
-        Pin::new(&mut self.io).poll_write_vectored(cx, slices)
+        let written = Pin::new(&mut self.io).poll_write_vectored(cx, slices);
+        self.note_sent(&written);
+        written
     }
 
     fn is_write_vectored(&self) -> bool {

@@ -16,6 +16,7 @@ use crate::core::ids::{JobId, ReplyId, WorkerId};
 use crate::core::reactor::react;
 use crate::core::snapshot;
 use crate::core::state::State;
+use crate::service::accept::Places;
 use crate::service::failing::{ComponentFailure, FailureReporter};
 use crate::service::job_spans::JobSpans;
 use crate::service::meter::{CoreReport, Meter};
@@ -57,6 +58,14 @@ impl Clock {
     }
 }
 
+/// What follows the events of the core.
+pub(crate) struct Monitoring {
+    /// Present if metrics are exported.
+    pub(crate) meter: Option<Meter>,
+    /// Present if spans are recorded.
+    pub(crate) spans: Option<JobSpans>,
+}
+
 /// The task that owns the state.
 pub(crate) struct Core {
     state: State,
@@ -64,6 +73,8 @@ pub(crate) struct Core {
     commands: mpsc::Sender<StoreCommand>,
     /// Leads back to this task.
     events: mpsc::Sender<Event>,
+    /// Of the connections of clients and workers.
+    places: Places,
     next_reply_id: u64,
     waiting: BTreeMap<ReplyId, oneshot::Sender<Answer>>,
     /// Newest snapshots of the jobs that are being watched.
@@ -86,9 +97,9 @@ impl Core {
         clock: Clock,
         commands: mpsc::Sender<StoreCommand>,
         events: mpsc::Sender<Event>,
+        places: Places,
         failing: FailureReporter,
-        meter: Option<Meter>,
-        spans: Option<JobSpans>,
+        Monitoring { meter, spans }: Monitoring,
     ) -> Self {
         let config = state.config;
         Self {
@@ -96,6 +107,7 @@ impl Core {
             clock,
             commands,
             events,
+            places,
             next_reply_id: 0,
             waiting: BTreeMap::new(),
             watching: BTreeMap::new(),
@@ -133,9 +145,14 @@ impl Core {
             tokio::select! {
                 Some(message) = inbox.recv() => self.message(message),
                 Some(event) = from_store.recv() => self.handle(VecDeque::from([event])),
-                _ = ticks.tick() => self.handle(VecDeque::from([Event::Tick])),
+                _ = ticks.tick() => self.tick(),
             }
         }
+    }
+
+    fn tick(&mut self) {
+        let (open, most) = self.places.taken();
+        self.handle(VecDeque::from([Event::Connections { open, most }, Event::Tick]));
     }
 
     fn message(&mut self, message: Message) {

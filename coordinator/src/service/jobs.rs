@@ -86,6 +86,14 @@ impl JobsService {
         answered(answer).await
     }
 
+    /// Returns what an operator should know, as sentences.
+    pub(crate) async fn concerns(&self) -> Result<Vec<String>, Status> {
+        match self.ask(event::Request::Concerns).await? {
+            Answer::Concerns(concerns) => Ok(concerns),
+            _ => Err(unexpected()),
+        }
+    }
+
     async fn submit_traced(
         &self,
         request: event::Request,
@@ -191,10 +199,12 @@ impl Jobs for JobsService {
             })?),
         };
         let limit = if page_size == 0 { PAGE_JOBS_MAX } else { page_size.min(PAGE_JOBS_MAX) };
+        let concerns = if after.is_none() { self.concerns().await? } else { Vec::new() };
         match self.ask(event::Request::List { after, limit: limit as usize }).await? {
             Answer::Page { snapshots, more_after } => Ok(Response::new(ListResponse {
                 jobs: snapshots,
                 next_page_token: more_after.map(|job| job.to_string()).unwrap_or_default(),
+                concerns,
             })),
             _ => Err(unexpected()),
         }
@@ -373,9 +383,9 @@ fn refused(refusal: &Refusal) -> Status {
         }
         Refusal::NotBanned { host } => status::not_found(Resource::Host, host.clone(), message),
         Refusal::RequestIdTaken { .. } => Status::already_exists(message),
-        Refusal::TooManyJobs { .. } | Refusal::TooMuchQueued { .. } => {
-            status::resource_exhausted(message, RETRY)
-        }
+        Refusal::TooManyJobs { .. }
+        | Refusal::ClientHasTooManyJobs { .. }
+        | Refusal::TooMuchQueued { .. } => status::resource_exhausted(message, RETRY),
         Refusal::NotEnded { .. } | Refusal::NoDoubt { .. } => Status::failed_precondition(message),
         Refusal::Draining
         | Refusal::Store { .. }
@@ -404,6 +414,11 @@ mod tests {
         let taken = Refusal::RequestIdTaken { request_id: "a".to_owned(), job };
         for (refusal, code, retry) in [
             (Refusal::TooManyJobs { limit: 5 }, Code::ResourceExhausted, Some(RETRY)),
+            (
+                Refusal::ClientHasTooManyJobs { client: "a".to_owned(), limit: 5, all: 20 },
+                Code::ResourceExhausted,
+                Some(RETRY),
+            ),
             (
                 Refusal::TooMuchQueued { whose: "all", held: 5, more: 2, limit: 6 },
                 Code::ResourceExhausted,

@@ -2,23 +2,47 @@
 
 use osteon_common::limits::CONNECTIONS_MAX;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+use thiserror::Error;
 
 /// Number of open files that are not connections: those of the store, standard streams and the
 /// runtime.
 const OTHERS: u64 = 32;
+/// Fewest connections with which a coordinator is of use: a worker, and clients that come and go.
+const CONNECTIONS_MIN: u64 = 4;
+/// Open files for each worker of a run on this machine: its connection, its stderr, and its process.
+const FILES_OF_WORKER: u64 = 3;
+
+/// This process may not have as many open files as it needs.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "this process may have {limit} open files and needs {needed}: raise the limit with `ulimit -n {needed}` \
+     (`ulimit -Hn` is the most that the system allows; LimitNOFILE= of a systemd unit)"
+)]
+pub struct TooFewOpenFiles {
+    /// Maximum number of open files.
+    pub limit: u64,
+    /// Number that is needed.
+    pub needed: u64,
+}
+
+/// Makes sure that this process may have the open files of a coordinator and of so many workers that it starts
+/// itself. Without them connections would not be accepted, and nobody would be told why.
+///
+/// # Errors
+/// If the system does not allow as many.
+pub fn require_for_run(workers: u32) -> Result<(), TooFewOpenFiles> {
+    require(OTHERS + CONNECTIONS_MIN + FILES_OF_WORKER * u64::from(workers))
+}
 
 /// Raises this process's limit of open files to the number that all connections need, as far as the
 /// system allows, and warns if that is not enough.
-pub fn raise_limit() {
+///
+/// # Errors
+/// If it is not enough for any use.
+pub fn raise_limit() -> Result<(), TooFewOpenFiles> {
     let wanted = CONNECTIONS_MAX as u64 + OTHERS;
-    let Rlimit { current, maximum } = getrlimit(Resource::Nofile);
-    if let Some(current) = current.filter(|current| *current < wanted) {
-        let raised = maximum.map_or(wanted, |maximum| maximum.min(wanted));
-        let limit = Rlimit { current: Some(raised.max(current)), maximum };
-        if let Err(error) = setrlimit(Resource::Nofile, limit) {
-            tracing::warn!(%error, "cannot raise the limit of open files");
-        }
-    }
+    raise(wanted);
+    require(OTHERS + CONNECTIONS_MIN)?;
     let connections = connections_max();
     if connections < CONNECTIONS_MAX {
         tracing::warn!(
@@ -27,6 +51,27 @@ pub fn raise_limit() {
             "fewer connections at a time than usual, for want of open files: raise the limit to \
              {wanted} (`ulimit -Hn`, LimitNOFILE= of a systemd unit)"
         );
+    }
+    Ok(())
+}
+
+/// Raises the limit to a number, as far as the system allows.
+fn raise(wanted: u64) {
+    let Rlimit { current, maximum } = getrlimit(Resource::Nofile);
+    if let Some(current) = current.filter(|current| *current < wanted) {
+        let raised = maximum.map_or(wanted, |maximum| maximum.min(wanted));
+        let limit = Rlimit { current: Some(raised.max(current)), maximum };
+        if let Err(error) = setrlimit(Resource::Nofile, limit) {
+            tracing::warn!(%error, "cannot raise the limit of open files");
+        }
+    }
+}
+
+fn require(needed: u64) -> Result<(), TooFewOpenFiles> {
+    raise(needed);
+    match getrlimit(Resource::Nofile).current {
+        Some(limit) if limit < needed => Err(TooFewOpenFiles { limit, needed }),
+        _ => Ok(()),
     }
 }
 

@@ -31,8 +31,8 @@ use crate::live::listener::PageListener;
 use crate::live::routes;
 use crate::live::source::PageSource;
 use crate::metrics::write_times::WriteTimes;
-use crate::service::accept;
-use crate::service::core_task::{Clock, Core, Message};
+use crate::service::accept::{self, Places};
+use crate::service::core_task::{Clock, Core, Message, Monitoring};
 use crate::service::failing::{ComponentFailure, FailureReporter, Guard};
 use crate::service::job_spans::JobSpans;
 use crate::service::jobs::JobsService;
@@ -202,12 +202,13 @@ pub async fn start(
     let router = services(&messages, &commands, decided, config).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
-    let server = serve(router, listener, shown, stopped);
+    let places = Places::of_coordinator();
+    let server = serve(router, listener, shown, places.clone(), stopped);
     let server = tokio::spawn(guarded(failing.guard(ComponentFailure::Server), server));
     let guard = failing.guard(ComponentFailure::Core);
     let meter = (metrics.is_some() || page.is_some()).then(Meter::default);
-    let spans = listener_spans.map(JobSpans::new);
-    let core = Core::new(state, clock, commands, events, failing.clone(), meter, spans);
+    let monitoring = Monitoring { meter, spans: listener_spans.map(JobSpans::new) };
+    let core = Core::new(state, clock, commands, events, places, failing.clone(), monitoring);
     let core = core.run(effects, inbox, from_store, config.tick);
     let core = tokio::spawn(guarded(guard, core));
     tracing::info!(%url, "listening");
@@ -364,6 +365,7 @@ async fn serve(
     router: GuardedRouter,
     listener: Listener,
     tls: Option<watch::Receiver<Tls>>,
+    places: Places,
     stopped: oneshot::Receiver<()>,
 ) {
     let signal = async {
@@ -371,7 +373,7 @@ async fn serve(
         let _ = stopped.await;
     };
     let Listener { bound, file: _file, .. } = listener;
-    let connections = accept::connections(bound, tls);
+    let connections = accept::connections(bound, tls, places);
     if let Err(error) = router.serve_with_incoming_shutdown(connections, signal).await {
         tracing::error!(%error, "the server ended");
     }

@@ -453,6 +453,10 @@ impl Store for &SqliteStore {
         })
     }
 
+    fn stuck_log(&self) -> Option<u64> {
+        self.log.stuck()
+    }
+
     fn copy(&mut self, between: &mut BetweenPieces<'_>) -> Result<Option<File>, StoreError> {
         let mut store = *self;
         let mut lend = || between(&mut store as &mut dyn Store);

@@ -71,12 +71,14 @@ pub(crate) fn serve(
 ) {
     let mut inbox = Inbox { commands, next: None };
     let (readings, copies) = (VecDeque::new(), VecDeque::new());
-    let mut desk = PendingWork { events, write_times, readings, copies, unsettled: false };
+    let mut desk =
+        PendingWork { events, write_times, readings, copies, unsettled: false, stuck: None };
     loop {
         let mut command = inbox.take();
         if matches!(command, Err(TryRecvError::Empty)) && desk.is_empty() {
             if desk.unsettled {
                 desk.unsettled = store.settle();
+                desk.tell_of_log(store);
                 continue;
             }
             command = inbox.wait().ok_or(TryRecvError::Disconnected);
@@ -150,9 +152,22 @@ struct PendingWork<'a> {
     copies: VecDeque<CopyReply>,
     /// The store has work that no record waits for.
     unsettled: bool,
+    /// Length of the store's log, bytes, if the core was told that it is stuck.
+    stuck: Option<u64>,
 }
 
 impl PendingWork<'_> {
+    /// Tells the core whether the log is copied, when that changes.
+    fn tell_of_log(&mut self, store: &dyn Store) {
+        let stuck = store.stuck_log();
+        if stuck != self.stuck {
+            self.stuck = stuck;
+            let event = stuck.map_or(Event::LogCopied, |bytes| Event::LogStuck { bytes });
+            // The receiver is gone when the coordinator has stopped.
+            drop(self.events.blocking_send(event));
+        }
+    }
+
     fn is_empty(&self) -> bool {
         self.readings.is_empty() && self.copies.is_empty()
     }

@@ -83,6 +83,7 @@ fn result() -> JobResult {
         scrambles: 2,
         control_variate: true,
         solver: SolverSettings::default(),
+        integrity: None,
         nominal: NominalSampling::from_setup(&Setup::default()),
         picking: Picking::default(),
         program: Program {

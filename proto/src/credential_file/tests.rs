@@ -40,7 +40,7 @@ impl Place {
 fn a_certificate_and_its_key_are_read() {
     let place = Place::new();
     let (certificate, key) = place.pair("good", 2000, 4000);
-    assert_eq!(identity(&certificate, &key).unwrap().chain.len(), 1);
+    assert_eq!(identity(&certificate, &key).unwrap().cert.len(), 1);
     // The permissions of mounted secrets.
     fs::set_permissions(&key, fs::Permissions::from_mode(0o440)).unwrap();
     assert!(identity(&certificate, &key).is_ok());

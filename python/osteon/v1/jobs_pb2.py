@@ -27,7 +27,7 @@ from osteon.v1 import results_pb2 as osteon_dot_v1_dot_results__pb2
 from osteon.v1 import specification_pb2 as osteon_dot_v1_dot_specification__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x14osteon/v1/jobs.proto\x12\tosteon.v1\x1a\x1fgoogle/protobuf/timestamp.proto\x1a\x17osteon/v1/results.proto\x1a\x1dosteon/v1/specification.proto\"\x87\x01\n\rSubmitRequest\x12\x32\n\rspecification\x18\x01 \x01(\x0b\x32\x1b.osteon.v1.JobSpecification\x12\x12\n\nrequest_id\x18\x02 \x01(\t\x12\x0e\n\x06\x63lient\x18\x03 \x01(\t\x12\x10\n\x08priority\x18\x04 \x01(\r\x12\x0c\n\x04name\x18\x05 \x01(\t\"\x1d\n\x0eSubmitResponse\x12\x0b\n\x03job\x18\x01 \x01(\t\"\x19\n\nGetRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\"7\n\x0bGetResponse\x12(\n\x08snapshot\x18\x01 \x01(\x0b\x32\x16.osteon.v1.JobSnapshot\"\x1d\n\x0e\x45xplainRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\"\xb6\x02\n\x0f\x45xplainResponse\x12\x0b\n\x03job\x18\x01 \x01(\t\x12%\n\x06reason\x18\x02 \x01(\x0e\x32\x15.osteon.v1.PaceReason\x12\x0c\n\x04text\x18\x03 \x01(\t\x12\r\n\x05slots\x18\x04 \x01(\x04\x12\x12\n\nslots_used\x18\x05 \x01(\x01\x12\x14\n\x0crealizations\x18\x06 \x01(\x04\x12\x19\n\x11realizations_left\x18\x07 \x01(\x04\x12\x1f\n\x17realizations_per_second\x18\x08 \x01(\x01\x12\x17\n\nexpected_s\x18\t \x01(\x01H\x00\x88\x01\x01\x12\x16\n\twaiting_s\x18\n \x01(\x01H\x01\x88\x01\x01\x12\x13\n\x06worker\x18\x0b \x01(\x04H\x02\x88\x01\x01\x42\r\n\x0b_expected_sB\x0c\n\n_waiting_sB\t\n\x07_worker\"4\n\x0bListRequest\x12\x11\n\tpage_size\x18\x01 \x01(\r\x12\x12\n\npage_token\x18\x02 \x01(\t\"M\n\x0cListResponse\x12$\n\x04jobs\x18\x01 \x03(\x0b\x32\x16.osteon.v1.JobSnapshot\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"*\n\x0cWatchRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\x12\r\n\x05\x61\x66ter\x18\x02 \x01(\x04\"9\n\rWatchResponse\x12(\n\x08snapshot\x18\x01 \x01(\x0b\x32\x16.osteon.v1.JobSnapshot\"\x1c\n\rCancelRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\":\n\x0e\x43\x61ncelResponse\x12(\n\x08snapshot\x18\x01 \x01(\x0b\x32\x16.osteon.v1.JobSnapshot\"\x1b\n\x0c\x46\x65tchRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\"\xa6\x02\n\rFetchResponse\x12\x34\n\rspecification\x18\x01 \x01(\x0b\x32\x1b.osteon.v1.JobSpecificationH\x00\x12&\n\x06result\x18\x02 \x01(\x0b\x32\x14.osteon.v1.JobResultH\x00\x12*\n\x07history\x18\x03 \x01(\x0b\x32\x17.osteon.v1.HistoryBlockH\x00\x12\'\n\x05group\x18\x04 \x01(\x0b\x32\x16.osteon.v1.GroupResultH\x00\x12\x33\n\x0crealizations\x18\x05 \x01(\x0b\x32\x1b.osteon.v1.RealizationBlockH\x00\x12%\n\x05\x64raws\x18\x06 \x01(\x0b\x32\x14.osteon.v1.DrawBlockH\x00\x42\x06\n\x04part\"\\\n\x0cPruneRequest\x12\x17\n\nkeep_for_s\x18\x01 \x01(\x01H\x00\x88\x01\x01\x12\x16\n\tkeep_last\x18\x02 \x01(\x04H\x01\x88\x01\x01\x42\r\n\x0b_keep_for_sB\x0c\n\n_keep_last\"\x1d\n\rPruneResponse\x12\x0c\n\x04jobs\x18\x01 \x03(\t\"\x11\n\x0fListBansRequest\"<\n\x10ListBansResponse\x12(\n\x07workers\x18\x01 \x03(\x0b\x32\x17.osteon.v1.BannedWorker\"]\n\x0c\x42\x61nnedWorker\x12\x0c\n\x04host\x18\x01 \x01(\t\x12\x0f\n\x07process\x18\x02 \x01(\r\x12\x0b\n\x03job\x18\x03 \x01(\t\x12\x0e\n\x06reason\x18\x04 \x01(\t\x12\x11\n\telapsed_s\x18\x05 \x01(\x01\"\xb6\x05\n\x0bJobSnapshot\x12\x0b\n\x03job\x18\x01 \x01(\t\x12 \n\x04kind\x18\x02 \x01(\x0e\x32\x12.osteon.v1.JobKind\x12\"\n\x05state\x18\x03 \x01(\x0e\x32\x13.osteon.v1.JobState\x12$\n\x06status\x18\x04 \x01(\x0e\x32\x14.osteon.v1.JobStatus\x12\x0e\n\x06reason\x18\x05 \x01(\t\x12\x13\n\x0b\x65valuations\x18\x06 \x01(\x04\x12\x17\n\x0fmax_evaluations\x18\x07 \x01(\x04\x12\x19\n\x11realizations_done\x18\x08 \x01(\x04\x12\x14\n\x0crealizations\x18\t \x01(\x04\x12\x16\n\tbest_cost\x18\n \x01(\x01H\x00\x88\x01\x01\x12\x16\n\tbest_mean\x18\x0b \x01(\x01H\x01\x88\x01\x01\x12*\n\x1d\x62\x65st_coefficient_of_variation\x18\x0c \x01(\x01H\x02\x88\x01\x01\x12\x1f\n\x17realizations_per_second\x18\r \x01(\x01\x12\x0f\n\x07workers\x18\x0e \x01(\r\x12\x11\n\telapsed_s\x18\x0f \x01(\x01\x12\x13\n\x0bwaiting_for\x18\x10 \x01(\t\x12\x10\n\x08sequence\x18\x11 \x01(\x04\x12*\n\x07\x66\x61ilure\x18\x12 \x01(\x0e\x32\x19.osteon.v1.JobFailureKind\x12\x0e\n\x06\x63lient\x18\x13 \x01(\t\x12\x0c\n\x04name\x18\x14 \x01(\t\x12\x10\n\x08priority\x18\x15 \x01(\r\x12/\n\x0bsubmit_time\x18\x16 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12,\n\x08\x65nd_time\x18\x17 \x01(\x0b\x32\x1a.google.protobuf.TimestampB\x0c\n\n_best_costB\x0c\n\n_best_meanB \n\x1e_best_coefficient_of_variation\"\x14\n\x12ListWorkersRequest\"n\n\x13ListWorkersResponse\x12*\n\x07workers\x18\x01 \x03(\x0b\x32\x19.osteon.v1.WorkerSnapshot\x12+\n\x08\x64\x65parted\x18\x02 \x03(\x0b\x32\x19.osteon.v1.DepartedWorker\"$\n\x12\x44rainWorkerRequest\x12\x0e\n\x06worker\x18\x01 \x01(\x04\"@\n\x13\x44rainWorkerResponse\x12)\n\x06worker\x18\x01 \x01(\x0b\x32\x19.osteon.v1.WorkerSnapshot\"\xab\x02\n\x0eWorkerSnapshot\x12\x0e\n\x06worker\x18\x01 \x01(\x04\x12\x0c\n\x04host\x18\x02 \x01(\t\x12\x0f\n\x07process\x18\x03 \x01(\r\x12\r\n\x05slots\x18\x04 \x01(\r\x12\x0f\n\x07version\x18\x05 \x01(\t\x12/\n\x0b\x61ttach_time\x18\x06 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x10\n\x08silent_s\x18\x07 \x01(\x01\x12\x1f\n\x17realizations_per_second\x18\x08 \x01(\x01\x12\x0f\n\x07\x62\x61tches\x18\t \x01(\r\x12\x1b\n\x0eoldest_batch_s\x18\n \x01(\x01H\x00\x88\x01\x01\x12%\n\x05state\x18\x0b \x01(\x0e\x32\x16.osteon.v1.WorkerStateB\x11\n\x0f_oldest_batch_s\"\x91\x01\n\x0e\x44\x65partedWorker\x12\x0e\n\x06worker\x18\x01 \x01(\x04\x12\x0c\n\x04host\x18\x02 \x01(\t\x12\x0f\n\x07process\x18\x03 \x01(\r\x12/\n\x0b\x64\x65part_time\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06reason\x18\x05 \x01(\t\x12\x0f\n\x07\x62\x61tches\x18\x06 \x01(\r\"\x0f\n\rBackupRequest\"M\n\x0e\x42\x61\x63kupResponse\x12\x0e\n\x04\x64\x61ta\x18\x01 \x01(\x0cH\x00\x12#\n\x03\x65nd\x18\x02 \x01(\x0b\x32\x14.osteon.v1.BackupEndH\x00\x42\x06\n\x04part\"+\n\tBackupEnd\x12\x0e\n\x06length\x18\x01 \x01(\x04\x12\x0e\n\x06\x64igest\x18\x02 \x01(\t*\xd0\x03\n\nPaceReason\x12\x1b\n\x17PACE_REASON_UNSPECIFIED\x10\x00\x12\x15\n\x11PACE_REASON_ENDED\x10\x01\x12\x1d\n\x19PACE_REASON_STORE_REFUSES\x10\x02\x12\x18\n\x14PACE_REASON_STOPPING\x10\x03\x12 \n\x1cPACE_REASON_WAITING_FOR_TURN\x10\x04\x12\x1d\n\x19PACE_REASON_READING_STORE\x10\x05\x12\x1a\n\x16PACE_REASON_STORE_SLOW\x10\x06\x12\x1a\n\x16PACE_REASON_NO_WORKERS\x10\x07\x12#\n\x1fPACE_REASON_WORKERS_UNAVAILABLE\x10\x08\x12\"\n\x1ePACE_REASON_UNRELIABLE_WORKERS\x10\t\x12\x17\n\x13PACE_REASON_DISPUTE\x10\n\x12!\n\x1dPACE_REASON_LAST_REALIZATIONS\x10\x0b\x12\x1a\n\x16PACE_REASON_OTHER_JOBS\x10\x0c\x12 \n\x1cPACE_REASON_FEW_REALIZATIONS\x10\r\x12\x19\n\x15PACE_REASON_COMPUTING\x10\x0e*h\n\x08JobState\x12\x19\n\x15JOB_STATE_UNSPECIFIED\x10\x00\x12\x15\n\x11JOB_STATE_WAITING\x10\x01\x12\x15\n\x11JOB_STATE_RUNNING\x10\x02\x12\x13\n\x0fJOB_STATE_ENDED\x10\x03*\x94\x01\n\x0bWorkerState\x12\x1c\n\x18WORKER_STATE_UNSPECIFIED\x10\x00\x12\x13\n\x0fWORKER_STATE_OK\x10\x01\x12\x19\n\x15WORKER_STATE_DRAINING\x10\x02\x12\x1b\n\x17WORKER_STATE_DISTRUSTED\x10\x03\x12\x1a\n\x16WORKER_STATE_PROBATION\x10\x04\x32\x8f\x06\n\x04Jobs\x12=\n\x06Submit\x12\x18.osteon.v1.SubmitRequest\x1a\x19.osteon.v1.SubmitResponse\x12\x34\n\x03Get\x12\x15.osteon.v1.GetRequest\x1a\x16.osteon.v1.GetResponse\x12@\n\x07\x45xplain\x12\x19.osteon.v1.ExplainRequest\x1a\x1a.osteon.v1.ExplainResponse\x12\x37\n\x04List\x12\x16.osteon.v1.ListRequest\x1a\x17.osteon.v1.ListResponse\x12<\n\x05Watch\x12\x17.osteon.v1.WatchRequest\x1a\x18.osteon.v1.WatchResponse0\x01\x12=\n\x06\x43\x61ncel\x12\x18.osteon.v1.CancelRequest\x1a\x19.osteon.v1.CancelResponse\x12<\n\x05\x46\x65tch\x12\x17.osteon.v1.FetchRequest\x1a\x18.osteon.v1.FetchResponse0\x01\x12:\n\x05Prune\x12\x17.osteon.v1.PruneRequest\x1a\x18.osteon.v1.PruneResponse\x12\x43\n\x08ListBans\x12\x1a.osteon.v1.ListBansRequest\x1a\x1b.osteon.v1.ListBansResponse\x12L\n\x0bListWorkers\x12\x1d.osteon.v1.ListWorkersRequest\x1a\x1e.osteon.v1.ListWorkersResponse\x12L\n\x0b\x44rainWorker\x12\x1d.osteon.v1.DrainWorkerRequest\x1a\x1e.osteon.v1.DrainWorkerResponse\x12?\n\x06\x42\x61\x63kup\x12\x18.osteon.v1.BackupRequest\x1a\x19.osteon.v1.BackupResponse0\x01\x42\x14Z\x12osteon/v1;osteonv1b\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x14osteon/v1/jobs.proto\x12\tosteon.v1\x1a\x1fgoogle/protobuf/timestamp.proto\x1a\x17osteon/v1/results.proto\x1a\x1dosteon/v1/specification.proto\"\x87\x01\n\rSubmitRequest\x12\x32\n\rspecification\x18\x01 \x01(\x0b\x32\x1b.osteon.v1.JobSpecification\x12\x12\n\nrequest_id\x18\x02 \x01(\t\x12\x0e\n\x06\x63lient\x18\x03 \x01(\t\x12\x10\n\x08priority\x18\x04 \x01(\r\x12\x0c\n\x04name\x18\x05 \x01(\t\"\x1d\n\x0eSubmitResponse\x12\x0b\n\x03job\x18\x01 \x01(\t\"\x19\n\nGetRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\"7\n\x0bGetResponse\x12(\n\x08snapshot\x18\x01 \x01(\x0b\x32\x16.osteon.v1.JobSnapshot\"\x1d\n\x0e\x45xplainRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\"\xb6\x02\n\x0f\x45xplainResponse\x12\x0b\n\x03job\x18\x01 \x01(\t\x12%\n\x06reason\x18\x02 \x01(\x0e\x32\x15.osteon.v1.PaceReason\x12\x0c\n\x04text\x18\x03 \x01(\t\x12\r\n\x05slots\x18\x04 \x01(\x04\x12\x12\n\nslots_used\x18\x05 \x01(\x01\x12\x14\n\x0crealizations\x18\x06 \x01(\x04\x12\x19\n\x11realizations_left\x18\x07 \x01(\x04\x12\x1f\n\x17realizations_per_second\x18\x08 \x01(\x01\x12\x17\n\nexpected_s\x18\t \x01(\x01H\x00\x88\x01\x01\x12\x16\n\twaiting_s\x18\n \x01(\x01H\x01\x88\x01\x01\x12\x13\n\x06worker\x18\x0b \x01(\x04H\x02\x88\x01\x01\x42\r\n\x0b_expected_sB\x0c\n\n_waiting_sB\t\n\x07_worker\"4\n\x0bListRequest\x12\x11\n\tpage_size\x18\x01 \x01(\r\x12\x12\n\npage_token\x18\x02 \x01(\t\"_\n\x0cListResponse\x12$\n\x04jobs\x18\x01 \x03(\x0b\x32\x16.osteon.v1.JobSnapshot\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\x12\x10\n\x08\x63oncerns\x18\x03 \x03(\t\"*\n\x0cWatchRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\x12\r\n\x05\x61\x66ter\x18\x02 \x01(\x04\"9\n\rWatchResponse\x12(\n\x08snapshot\x18\x01 \x01(\x0b\x32\x16.osteon.v1.JobSnapshot\"\x1c\n\rCancelRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\":\n\x0e\x43\x61ncelResponse\x12(\n\x08snapshot\x18\x01 \x01(\x0b\x32\x16.osteon.v1.JobSnapshot\"\x1b\n\x0c\x46\x65tchRequest\x12\x0b\n\x03job\x18\x01 \x01(\t\"\xa6\x02\n\rFetchResponse\x12\x34\n\rspecification\x18\x01 \x01(\x0b\x32\x1b.osteon.v1.JobSpecificationH\x00\x12&\n\x06result\x18\x02 \x01(\x0b\x32\x14.osteon.v1.JobResultH\x00\x12*\n\x07history\x18\x03 \x01(\x0b\x32\x17.osteon.v1.HistoryBlockH\x00\x12\'\n\x05group\x18\x04 \x01(\x0b\x32\x16.osteon.v1.GroupResultH\x00\x12\x33\n\x0crealizations\x18\x05 \x01(\x0b\x32\x1b.osteon.v1.RealizationBlockH\x00\x12%\n\x05\x64raws\x18\x06 \x01(\x0b\x32\x14.osteon.v1.DrawBlockH\x00\x42\x06\n\x04part\"\\\n\x0cPruneRequest\x12\x17\n\nkeep_for_s\x18\x01 \x01(\x01H\x00\x88\x01\x01\x12\x16\n\tkeep_last\x18\x02 \x01(\x04H\x01\x88\x01\x01\x42\r\n\x0b_keep_for_sB\x0c\n\n_keep_last\"\x1d\n\rPruneResponse\x12\x0c\n\x04jobs\x18\x01 \x03(\t\"\x11\n\x0fListBansRequest\"<\n\x10ListBansResponse\x12(\n\x07workers\x18\x01 \x03(\x0b\x32\x17.osteon.v1.BannedWorker\"]\n\x0c\x42\x61nnedWorker\x12\x0c\n\x04host\x18\x01 \x01(\t\x12\x0f\n\x07process\x18\x02 \x01(\r\x12\x0b\n\x03job\x18\x03 \x01(\t\x12\x0e\n\x06reason\x18\x04 \x01(\t\x12\x11\n\telapsed_s\x18\x05 \x01(\x01\"\xb6\x05\n\x0bJobSnapshot\x12\x0b\n\x03job\x18\x01 \x01(\t\x12 \n\x04kind\x18\x02 \x01(\x0e\x32\x12.osteon.v1.JobKind\x12\"\n\x05state\x18\x03 \x01(\x0e\x32\x13.osteon.v1.JobState\x12$\n\x06status\x18\x04 \x01(\x0e\x32\x14.osteon.v1.JobStatus\x12\x0e\n\x06reason\x18\x05 \x01(\t\x12\x13\n\x0b\x65valuations\x18\x06 \x01(\x04\x12\x17\n\x0fmax_evaluations\x18\x07 \x01(\x04\x12\x19\n\x11realizations_done\x18\x08 \x01(\x04\x12\x14\n\x0crealizations\x18\t \x01(\x04\x12\x16\n\tbest_cost\x18\n \x01(\x01H\x00\x88\x01\x01\x12\x16\n\tbest_mean\x18\x0b \x01(\x01H\x01\x88\x01\x01\x12*\n\x1d\x62\x65st_coefficient_of_variation\x18\x0c \x01(\x01H\x02\x88\x01\x01\x12\x1f\n\x17realizations_per_second\x18\r \x01(\x01\x12\x0f\n\x07workers\x18\x0e \x01(\r\x12\x11\n\telapsed_s\x18\x0f \x01(\x01\x12\x13\n\x0bwaiting_for\x18\x10 \x01(\t\x12\x10\n\x08sequence\x18\x11 \x01(\x04\x12*\n\x07\x66\x61ilure\x18\x12 \x01(\x0e\x32\x19.osteon.v1.JobFailureKind\x12\x0e\n\x06\x63lient\x18\x13 \x01(\t\x12\x0c\n\x04name\x18\x14 \x01(\t\x12\x10\n\x08priority\x18\x15 \x01(\r\x12/\n\x0bsubmit_time\x18\x16 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12,\n\x08\x65nd_time\x18\x17 \x01(\x0b\x32\x1a.google.protobuf.TimestampB\x0c\n\n_best_costB\x0c\n\n_best_meanB \n\x1e_best_coefficient_of_variation\"\x14\n\x12ListWorkersRequest\"n\n\x13ListWorkersResponse\x12*\n\x07workers\x18\x01 \x03(\x0b\x32\x19.osteon.v1.WorkerSnapshot\x12+\n\x08\x64\x65parted\x18\x02 \x03(\x0b\x32\x19.osteon.v1.DepartedWorker\"$\n\x12\x44rainWorkerRequest\x12\x0e\n\x06worker\x18\x01 \x01(\x04\"@\n\x13\x44rainWorkerResponse\x12)\n\x06worker\x18\x01 \x01(\x0b\x32\x19.osteon.v1.WorkerSnapshot\"\xab\x02\n\x0eWorkerSnapshot\x12\x0e\n\x06worker\x18\x01 \x01(\x04\x12\x0c\n\x04host\x18\x02 \x01(\t\x12\x0f\n\x07process\x18\x03 \x01(\r\x12\r\n\x05slots\x18\x04 \x01(\r\x12\x0f\n\x07version\x18\x05 \x01(\t\x12/\n\x0b\x61ttach_time\x18\x06 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x10\n\x08silent_s\x18\x07 \x01(\x01\x12\x1f\n\x17realizations_per_second\x18\x08 \x01(\x01\x12\x0f\n\x07\x62\x61tches\x18\t \x01(\r\x12\x1b\n\x0eoldest_batch_s\x18\n \x01(\x01H\x00\x88\x01\x01\x12%\n\x05state\x18\x0b \x01(\x0e\x32\x16.osteon.v1.WorkerStateB\x11\n\x0f_oldest_batch_s\"\x91\x01\n\x0e\x44\x65partedWorker\x12\x0e\n\x06worker\x18\x01 \x01(\x04\x12\x0c\n\x04host\x18\x02 \x01(\t\x12\x0f\n\x07process\x18\x03 \x01(\r\x12/\n\x0b\x64\x65part_time\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06reason\x18\x05 \x01(\t\x12\x0f\n\x07\x62\x61tches\x18\x06 \x01(\r\"\x0f\n\rBackupRequest\"M\n\x0e\x42\x61\x63kupResponse\x12\x0e\n\x04\x64\x61ta\x18\x01 \x01(\x0cH\x00\x12#\n\x03\x65nd\x18\x02 \x01(\x0b\x32\x14.osteon.v1.BackupEndH\x00\x42\x06\n\x04part\"+\n\tBackupEnd\x12\x0e\n\x06length\x18\x01 \x01(\x04\x12\x0e\n\x06\x64igest\x18\x02 \x01(\t*\xd0\x03\n\nPaceReason\x12\x1b\n\x17PACE_REASON_UNSPECIFIED\x10\x00\x12\x15\n\x11PACE_REASON_ENDED\x10\x01\x12\x1d\n\x19PACE_REASON_STORE_REFUSES\x10\x02\x12\x18\n\x14PACE_REASON_STOPPING\x10\x03\x12 \n\x1cPACE_REASON_WAITING_FOR_TURN\x10\x04\x12\x1d\n\x19PACE_REASON_READING_STORE\x10\x05\x12\x1a\n\x16PACE_REASON_STORE_SLOW\x10\x06\x12\x1a\n\x16PACE_REASON_NO_WORKERS\x10\x07\x12#\n\x1fPACE_REASON_WORKERS_UNAVAILABLE\x10\x08\x12\"\n\x1ePACE_REASON_UNRELIABLE_WORKERS\x10\t\x12\x17\n\x13PACE_REASON_DISPUTE\x10\n\x12!\n\x1dPACE_REASON_LAST_REALIZATIONS\x10\x0b\x12\x1a\n\x16PACE_REASON_OTHER_JOBS\x10\x0c\x12 \n\x1cPACE_REASON_FEW_REALIZATIONS\x10\r\x12\x19\n\x15PACE_REASON_COMPUTING\x10\x0e*h\n\x08JobState\x12\x19\n\x15JOB_STATE_UNSPECIFIED\x10\x00\x12\x15\n\x11JOB_STATE_WAITING\x10\x01\x12\x15\n\x11JOB_STATE_RUNNING\x10\x02\x12\x13\n\x0fJOB_STATE_ENDED\x10\x03*\x94\x01\n\x0bWorkerState\x12\x1c\n\x18WORKER_STATE_UNSPECIFIED\x10\x00\x12\x13\n\x0fWORKER_STATE_OK\x10\x01\x12\x19\n\x15WORKER_STATE_DRAINING\x10\x02\x12\x1b\n\x17WORKER_STATE_DISTRUSTED\x10\x03\x12\x1a\n\x16WORKER_STATE_PROBATION\x10\x04\x32\x8f\x06\n\x04Jobs\x12=\n\x06Submit\x12\x18.osteon.v1.SubmitRequest\x1a\x19.osteon.v1.SubmitResponse\x12\x34\n\x03Get\x12\x15.osteon.v1.GetRequest\x1a\x16.osteon.v1.GetResponse\x12@\n\x07\x45xplain\x12\x19.osteon.v1.ExplainRequest\x1a\x1a.osteon.v1.ExplainResponse\x12\x37\n\x04List\x12\x16.osteon.v1.ListRequest\x1a\x17.osteon.v1.ListResponse\x12<\n\x05Watch\x12\x17.osteon.v1.WatchRequest\x1a\x18.osteon.v1.WatchResponse0\x01\x12=\n\x06\x43\x61ncel\x12\x18.osteon.v1.CancelRequest\x1a\x19.osteon.v1.CancelResponse\x12<\n\x05\x46\x65tch\x12\x17.osteon.v1.FetchRequest\x1a\x18.osteon.v1.FetchResponse0\x01\x12:\n\x05Prune\x12\x17.osteon.v1.PruneRequest\x1a\x18.osteon.v1.PruneResponse\x12\x43\n\x08ListBans\x12\x1a.osteon.v1.ListBansRequest\x1a\x1b.osteon.v1.ListBansResponse\x12L\n\x0bListWorkers\x12\x1d.osteon.v1.ListWorkersRequest\x1a\x1e.osteon.v1.ListWorkersResponse\x12L\n\x0b\x44rainWorker\x12\x1d.osteon.v1.DrainWorkerRequest\x1a\x1e.osteon.v1.DrainWorkerResponse\x12?\n\x06\x42\x61\x63kup\x12\x18.osteon.v1.BackupRequest\x1a\x19.osteon.v1.BackupResponse0\x01\x42\x14Z\x12osteon/v1;osteonv1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -35,12 +35,12 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'osteon.v1.jobs_pb2', _globa
 if not _descriptor._USE_C_DESCRIPTORS:
   _globals['DESCRIPTOR']._loaded_options = None
   _globals['DESCRIPTOR']._serialized_options = b'Z\022osteon/v1;osteonv1'
-  _globals['_PACEREASON']._serialized_start=3201
-  _globals['_PACEREASON']._serialized_end=3665
-  _globals['_JOBSTATE']._serialized_start=3667
-  _globals['_JOBSTATE']._serialized_end=3771
-  _globals['_WORKERSTATE']._serialized_start=3774
-  _globals['_WORKERSTATE']._serialized_end=3922
+  _globals['_PACEREASON']._serialized_start=3219
+  _globals['_PACEREASON']._serialized_end=3683
+  _globals['_JOBSTATE']._serialized_start=3685
+  _globals['_JOBSTATE']._serialized_end=3789
+  _globals['_WORKERSTATE']._serialized_start=3792
+  _globals['_WORKERSTATE']._serialized_end=3940
   _globals['_SUBMITREQUEST']._serialized_start=125
   _globals['_SUBMITREQUEST']._serialized_end=260
   _globals['_SUBMITRESPONSE']._serialized_start=262
@@ -56,49 +56,49 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_LISTREQUEST']._serialized_start=721
   _globals['_LISTREQUEST']._serialized_end=773
   _globals['_LISTRESPONSE']._serialized_start=775
-  _globals['_LISTRESPONSE']._serialized_end=852
-  _globals['_WATCHREQUEST']._serialized_start=854
-  _globals['_WATCHREQUEST']._serialized_end=896
-  _globals['_WATCHRESPONSE']._serialized_start=898
-  _globals['_WATCHRESPONSE']._serialized_end=955
-  _globals['_CANCELREQUEST']._serialized_start=957
-  _globals['_CANCELREQUEST']._serialized_end=985
-  _globals['_CANCELRESPONSE']._serialized_start=987
-  _globals['_CANCELRESPONSE']._serialized_end=1045
-  _globals['_FETCHREQUEST']._serialized_start=1047
-  _globals['_FETCHREQUEST']._serialized_end=1074
-  _globals['_FETCHRESPONSE']._serialized_start=1077
-  _globals['_FETCHRESPONSE']._serialized_end=1371
-  _globals['_PRUNEREQUEST']._serialized_start=1373
-  _globals['_PRUNEREQUEST']._serialized_end=1465
-  _globals['_PRUNERESPONSE']._serialized_start=1467
-  _globals['_PRUNERESPONSE']._serialized_end=1496
-  _globals['_LISTBANSREQUEST']._serialized_start=1498
-  _globals['_LISTBANSREQUEST']._serialized_end=1515
-  _globals['_LISTBANSRESPONSE']._serialized_start=1517
-  _globals['_LISTBANSRESPONSE']._serialized_end=1577
-  _globals['_BANNEDWORKER']._serialized_start=1579
-  _globals['_BANNEDWORKER']._serialized_end=1672
-  _globals['_JOBSNAPSHOT']._serialized_start=1675
-  _globals['_JOBSNAPSHOT']._serialized_end=2369
-  _globals['_LISTWORKERSREQUEST']._serialized_start=2371
-  _globals['_LISTWORKERSREQUEST']._serialized_end=2391
-  _globals['_LISTWORKERSRESPONSE']._serialized_start=2393
-  _globals['_LISTWORKERSRESPONSE']._serialized_end=2503
-  _globals['_DRAINWORKERREQUEST']._serialized_start=2505
-  _globals['_DRAINWORKERREQUEST']._serialized_end=2541
-  _globals['_DRAINWORKERRESPONSE']._serialized_start=2543
-  _globals['_DRAINWORKERRESPONSE']._serialized_end=2607
-  _globals['_WORKERSNAPSHOT']._serialized_start=2610
-  _globals['_WORKERSNAPSHOT']._serialized_end=2909
-  _globals['_DEPARTEDWORKER']._serialized_start=2912
-  _globals['_DEPARTEDWORKER']._serialized_end=3057
-  _globals['_BACKUPREQUEST']._serialized_start=3059
-  _globals['_BACKUPREQUEST']._serialized_end=3074
-  _globals['_BACKUPRESPONSE']._serialized_start=3076
-  _globals['_BACKUPRESPONSE']._serialized_end=3153
-  _globals['_BACKUPEND']._serialized_start=3155
-  _globals['_BACKUPEND']._serialized_end=3198
-  _globals['_JOBS']._serialized_start=3925
-  _globals['_JOBS']._serialized_end=4708
+  _globals['_LISTRESPONSE']._serialized_end=870
+  _globals['_WATCHREQUEST']._serialized_start=872
+  _globals['_WATCHREQUEST']._serialized_end=914
+  _globals['_WATCHRESPONSE']._serialized_start=916
+  _globals['_WATCHRESPONSE']._serialized_end=973
+  _globals['_CANCELREQUEST']._serialized_start=975
+  _globals['_CANCELREQUEST']._serialized_end=1003
+  _globals['_CANCELRESPONSE']._serialized_start=1005
+  _globals['_CANCELRESPONSE']._serialized_end=1063
+  _globals['_FETCHREQUEST']._serialized_start=1065
+  _globals['_FETCHREQUEST']._serialized_end=1092
+  _globals['_FETCHRESPONSE']._serialized_start=1095
+  _globals['_FETCHRESPONSE']._serialized_end=1389
+  _globals['_PRUNEREQUEST']._serialized_start=1391
+  _globals['_PRUNEREQUEST']._serialized_end=1483
+  _globals['_PRUNERESPONSE']._serialized_start=1485
+  _globals['_PRUNERESPONSE']._serialized_end=1514
+  _globals['_LISTBANSREQUEST']._serialized_start=1516
+  _globals['_LISTBANSREQUEST']._serialized_end=1533
+  _globals['_LISTBANSRESPONSE']._serialized_start=1535
+  _globals['_LISTBANSRESPONSE']._serialized_end=1595
+  _globals['_BANNEDWORKER']._serialized_start=1597
+  _globals['_BANNEDWORKER']._serialized_end=1690
+  _globals['_JOBSNAPSHOT']._serialized_start=1693
+  _globals['_JOBSNAPSHOT']._serialized_end=2387
+  _globals['_LISTWORKERSREQUEST']._serialized_start=2389
+  _globals['_LISTWORKERSREQUEST']._serialized_end=2409
+  _globals['_LISTWORKERSRESPONSE']._serialized_start=2411
+  _globals['_LISTWORKERSRESPONSE']._serialized_end=2521
+  _globals['_DRAINWORKERREQUEST']._serialized_start=2523
+  _globals['_DRAINWORKERREQUEST']._serialized_end=2559
+  _globals['_DRAINWORKERRESPONSE']._serialized_start=2561
+  _globals['_DRAINWORKERRESPONSE']._serialized_end=2625
+  _globals['_WORKERSNAPSHOT']._serialized_start=2628
+  _globals['_WORKERSNAPSHOT']._serialized_end=2927
+  _globals['_DEPARTEDWORKER']._serialized_start=2930
+  _globals['_DEPARTEDWORKER']._serialized_end=3075
+  _globals['_BACKUPREQUEST']._serialized_start=3077
+  _globals['_BACKUPREQUEST']._serialized_end=3092
+  _globals['_BACKUPRESPONSE']._serialized_start=3094
+  _globals['_BACKUPRESPONSE']._serialized_end=3171
+  _globals['_BACKUPEND']._serialized_start=3173
+  _globals['_BACKUPEND']._serialized_end=3216
+  _globals['_JOBS']._serialized_start=3943
+  _globals['_JOBS']._serialized_end=4726
 # @@protoc_insertion_point(module_scope)

@@ -3,6 +3,8 @@
 //! Written with intrinsics and not with the solver's own registers: what keeps the solver from the
 //! peak must not lower the peak.
 
+#![expect(unsafe_code, reason = "intrinsics")]
+
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -322,6 +322,7 @@ async fn threads_have_bounds() {
         let config = WorkerConfig {
             endpoint,
             credentials: Credentials::default(),
+            host: None,
             threads,
             isa: Isa::fastest(),
             give_up_after: None,

@@ -21,6 +21,7 @@ use crate::core::sanity::sanity_check;
 mod ahead;
 mod checks;
 mod completion;
+mod concerns;
 mod dispatch;
 mod explain;
 mod fairness;
@@ -157,10 +158,19 @@ fn identification(realizations: u64) -> JobSpecification {
 }
 
 fn submit(reply_id: u64, request_id: &str, specification: JobSpecification) -> Event {
+    submit_of("", reply_id, request_id, specification)
+}
+
+fn submit_of(
+    client: &str,
+    reply_id: u64,
+    request_id: &str,
+    specification: JobSpecification,
+) -> Event {
     let request = Request::Submit {
         specification: Arc::new(specification),
         request_id: request_id.to_owned(),
-        client: String::new(),
+        client: client.to_owned(),
         priority: 0,
         name: String::new(),
     };
@@ -285,6 +295,7 @@ fn answered(answer: &Answer) -> String {
         }
         Answer::Unbanned(record) => format!("lifted {}", record.worker.host()),
         Answer::Worker(worker) => format!("worker {} {:?}", worker.worker, worker.state()),
+        Answer::Concerns(concerns) => concerns.join(", "),
         Answer::Refused(refusal) => refusal.to_string(),
     }
 }

@@ -1,4 +1,5 @@
 use axum::http::Request;
+use osteon_proto::identity::host_name;
 
 use super::*;
 use crate::access::tokens::Tokens;

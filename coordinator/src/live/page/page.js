@@ -117,9 +117,9 @@ const showOverview = (overview) => {
   ]);
 };
 
-const showAlerts = ({ jobs: all, workers, store, mismatches }) => {
+const showAlerts = ({ jobs: all, workers, mismatches, concerns }) => {
   const alerts = [];
-  if (store.refusing_s > 0) alerts.push(["bad", "Store", `It has refused records for ${span(store.refusing_s)}; the log says why.`]);
+  for (const [number, text] of concerns.entries()) alerts.push(["bad", `Note ${number + 1}`, `${text[0].toUpperCase()}${text.slice(1)}.`]);
   if (workers.count === 0 && all.running + all.waiting > 0) alerts.push(["caution", "Workers", "None is attached, so nothing is computed."]);
   if (workers.banned > 0) alerts.push(["bad", "Banned", `${count(workers.banned, "host", "hosts")} gave wrong results and ${workers.banned === 1 ? "is" : "are"} refused until an operator lifts the ban (osteon workers unban).`]);
   if (workers.on_probation + workers.distrusted > 0) alerts.push(["caution", "Unreliable", `${count(workers.on_probation + workers.distrusted, "worker gets", "workers get")} little work: batches were lost or not answered.`]);

@@ -15,7 +15,7 @@ async fn listener() -> (BoundSocket, std::net::SocketAddr) {
 #[tokio::test(start_paused = true)]
 async fn a_connection_that_says_nothing_ends_and_one_that_spoke_may_be_silent() {
     let (bound, address) = listener().await;
-    let mut connections = Box::pin(connections(bound, None));
+    let mut connections = Box::pin(connections(bound, None, Places::new(10)));
     let mut client = TcpStream::connect(address).await.unwrap();
     let mut silent = connections.next().await.unwrap().unwrap();
     let started = Instant::now();
@@ -40,7 +40,7 @@ async fn there_are_no_more_connections_than_places() {
     let _first_client = TcpStream::connect(address).await.unwrap();
     let _second_client = TcpStream::connect(address).await.unwrap();
     let (io, place) = accept(&bound, &places).await.unwrap();
-    let first = AcceptedConnection::new(Either::Right(io), Certificate::Absent, place);
+    let first = AcceptedConnection::new(Either::Right(io), None, Certificate::Absent, place);
     assert_eq!(places.available_permits(), 0);
     drop(first);
     // The permit is free again.

@@ -4,6 +4,7 @@
 //! it so long, and whoever waits for a large record would wait twice as long. So the copy is made
 //! later, between records.
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 
@@ -23,6 +24,10 @@ pub(super) struct Log {
     pages: Arc<AtomicI32>,
     /// Length from which on it is copied between records, in pages.
     due: i32,
+    /// Size of a page, bytes.
+    page_bytes: i64,
+    /// Its length when it was last due and could not be copied, or not all of it, in pages.
+    stuck: Cell<Option<i32>>,
 }
 
 impl Log {
@@ -42,17 +47,31 @@ impl Log {
             length.store(pages, Ordering::Relaxed);
             if pages < full { Ok(()) } else { log.checkpoint() }
         }))?;
-        Ok(Self { pages, due: pages_of(DUE_BYTES) })
+        let (due, stuck) = (pages_of(DUE_BYTES), Cell::new(None));
+        Ok(Self { pages, due, page_bytes: page, stuck })
     }
 
     /// Copies the log, if it is long.
     pub(super) fn copy(&self, connection: &Connection) -> rusqlite::Result<()> {
-        if self.pages.load(Ordering::Relaxed) < self.due {
+        let length = self.pages.load(Ordering::Relaxed);
+        if length < self.due {
             return Ok(());
         }
-        // The next record starts the log again.
+        // The next record starts the log again, or says how long it is.
         self.pages.store(0, Ordering::Relaxed);
-        connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))
+        self.stuck.set(Some(length));
+        let sql = "PRAGMA wal_checkpoint(PASSIVE)";
+        let (all, copied): (i32, i32) =
+            connection.query_row(sql, [], |row| Ok((row.get(1)?, row.get(2)?)))?;
+        // Whoever reads an older state of the database keeps the rest from being copied; where the database is
+        // locked, as a running coordinator does, that is nobody.
+        self.stuck.set(Some(all).filter(|all| copied < *all));
+        Ok(())
+    }
+
+    /// Returns its length, bytes, if it could not be copied when that was last due.
+    pub(super) fn stuck(&self) -> Option<u64> {
+        u64::try_from(i64::from(self.stuck.get()?) * self.page_bytes).ok()
     }
 }
 
@@ -87,5 +106,37 @@ mod tests {
         assert!(copied() > 2 * DUE_BYTES, "{} bytes", copied());
         put(full);
         assert!(copied() > full + 2 * DUE_BYTES, "{} bytes", copied());
+    }
+
+    /// A program that reads an old state keeps the log from being copied: that is noticed, and nothing is lost.
+    #[test]
+    fn a_log_that_somebody_reads_is_known_to_be_stuck() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("store.sqlite");
+        let mut connection = Connection::open(&path).unwrap();
+        connection.pragma_update(None, "journal_mode", "WAL").unwrap();
+        connection.execute_batch("CREATE TABLE blobs (bytes BLOB)").unwrap();
+        let log = Log::of(&mut connection).unwrap();
+        let put = || {
+            connection.execute("INSERT INTO blobs VALUES (zeroblob(?1))", [DUE_BYTES]).unwrap();
+            log.copy(&connection).unwrap();
+        };
+        put();
+        assert_eq!(log.stuck(), None);
+        let reader = Connection::open(&path).unwrap();
+        let count = |of: &Connection| -> i64 {
+            of.query_row("SELECT count(*) FROM blobs", [], |row| row.get(0)).unwrap()
+        };
+        reader.execute_batch("BEGIN").unwrap();
+        assert_eq!(count(&reader), 1);
+        for records in 2..5 {
+            put();
+            let least = u64::try_from(DUE_BYTES).unwrap() * (records - 1);
+            assert!(log.stuck().unwrap() >= least, "{records}: {:?}", log.stuck());
+        }
+        assert_eq!((count(&reader), count(&connection)), (1, 4));
+        reader.execute_batch("COMMIT").unwrap();
+        put();
+        assert_eq!((log.stuck(), count(&reader)), (None, 5));
     }
 }

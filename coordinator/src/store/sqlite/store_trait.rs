@@ -21,6 +21,10 @@ impl Store for SqliteStore {
         (&*self).settle()
     }
 
+    fn stuck_log(&self) -> Option<u64> {
+        (&self).stuck_log()
+    }
+
     fn visit_jobs(&mut self, visit: &mut dyn FnMut(StoredJob)) -> Result<(), StoreError> {
         (&*self).visit_jobs(visit)
     }

@@ -3,17 +3,18 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_common::job::{Data, Group, JobSpecification, VelocitySet};
-use osteon_common::limits::{JOBS_BYTES_CLIENT_DIVISOR, JOBS_MAX};
+use osteon_common::job::JobSpecification;
+use osteon_common::limits::{CLIENT_SHARE_DIVISOR, JOBS_MAX};
 use osteon_common::version;
 
 use super::{jobs, prune, recheck, workers};
+use crate::core::concerns;
 use crate::core::effect::{Answer, Effect, Record, Refusal};
 use crate::core::event::Request;
 use crate::core::explain;
 use crate::core::explain::facts::JobFacts;
 use crate::core::ids::{JobId, ReplyId, WorkerId};
-use crate::core::job::{Job, RequestName, Stage, identity};
+use crate::core::job::{Job, RequestName, Stage, bytes, identity};
 use crate::core::job_pages;
 use crate::core::reactor::turn::Turn;
 use crate::core::snapshot;
@@ -35,6 +36,10 @@ pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, request: Request) {
         }
         Request::Get(job) => Some(get(turn.state, job, turn.now)),
         Request::Explain(job) => Some(explain(turn.state, job, turn.now)),
+        Request::Concerns => {
+            let concerns = concerns::concerns(turn.state, turn.now);
+            Some(Answer::Concerns(concerns.iter().map(ToString::to_string).collect()))
+        }
         Request::List { after, limit } => {
             Some(job_pages::oldest_first(turn.state, after, limit, turn.now))
         }
@@ -84,9 +89,7 @@ fn submit(
     if let Some(known) = request.as_ref().and_then(|request| turn.state.requests.get(request)) {
         return resubmit(turn.state, reply_id, *known, &specification, request_id);
     }
-    if turn.state.unfinished() >= JOBS_MAX {
-        return Err(Refusal::TooManyJobs { limit: JOBS_MAX });
-    }
+    find_place(turn.state, &client)?;
     find_room(turn.state, &client, bytes(&specification))?;
     let id = JobId(turn.state.next_job);
     turn.state.next_job += 1;
@@ -109,15 +112,28 @@ fn submit(
     Ok(None)
 }
 
+/// Checks that one more job of a client fits beside those that have not ended.
+fn find_place(state: &State, client: &str) -> Result<(), Refusal> {
+    if state.unfinished() >= JOBS_MAX {
+        return Err(Refusal::TooManyJobs { limit: JOBS_MAX });
+    }
+    let limit = JOBS_MAX / CLIENT_SHARE_DIVISOR as usize;
+    if state.jobs.values().filter(|job| job.record.client == client).count() >= limit {
+        let client = client.to_owned();
+        return Err(Refusal::ClientHasTooManyJobs { client, limit, all: JOBS_MAX });
+    }
+    Ok(())
+}
+
 /// Checks that a specification of `more` bytes fits beside those of the jobs that have not ended.
 fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
     let of = |whose: &dyn Fn(&str) -> bool| -> u64 {
-        let records = state.jobs.values().map(|job| &job.record);
-        records.filter(|it| whose(&it.client)).map(|it| bytes(&it.specification)).sum()
+        let jobs = state.jobs.values().filter(|job| whose(&job.record.client));
+        jobs.map(|job| job.bytes).sum()
     };
     let limit = state.config.jobs_bytes_max;
     for (whose, held, limit) in [
-        ("this client's", of(&|name| name == client), limit / JOBS_BYTES_CLIENT_DIVISOR),
+        ("this client's", of(&|name| name == client), limit / u64::from(CLIENT_SHARE_DIVISOR)),
         ("all", of(&|_| true), limit),
     ] {
         if held + more > limit {
@@ -125,21 +141,6 @@ fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
         }
     }
     Ok(())
-}
-
-/// Returns the approximate memory of a specification, bytes.
-fn bytes(specification: &JobSpecification) -> u64 {
-    let of_data = |data: &Data| {
-        let names: usize =
-            data.groups().iter().map(|group| size_of::<Group>() + group.name.len()).sum();
-        let of_set = |set: VelocitySet<'_>| {
-            size_of_val(set.velocities) + set.subjects.map_or(0, size_of_val)
-        };
-        let sets: usize = (0..data.sets()).filter_map(|set| data.set(set)).map(of_set).sum();
-        names + sets
-    };
-    let data = specification.data.as_ref().map_or(0, of_data);
-    (size_of::<JobSpecification>() + data) as u64
 }
 
 fn resubmit(

@@ -4,9 +4,11 @@ use std::time::Duration;
 
 use super::{jobs, records, workers};
 use crate::core::close_reason::CloseReason;
+use crate::core::concerns;
 use crate::core::effect::{Effect, Record};
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::{Stage, sequence};
+use crate::core::notice::Notice;
 use crate::core::reactor::dispatch::poison;
 use crate::core::reactor::turn::Turn;
 use crate::core::saved::{self, SAVE_AFTER, SAVE_EVERY, SAVED_AT_ONCE_MAX};
@@ -35,6 +37,9 @@ pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
         excused(&mut batch.begun);
     }
     for job in state.jobs.values_mut() {
+        if let Some(retry) = &mut job.store_retry {
+            excused(&mut retry.since);
+        }
         for evaluation in job.evaluations_mut() {
             evaluation.crashes.values_mut().for_each(|crashes| crashes.shift(excused));
             for dispute in &mut evaluation.disputes {
@@ -145,6 +150,16 @@ pub(crate) fn store_pieces(turn: &mut Turn) {
             turn.effects.extend(stored);
         }
     }
+}
+
+/// Tells the log what an operator should know.
+pub(crate) fn tell_concerns(turn: &mut Turn) {
+    if turn.now.saturating_sub(turn.state.condition.looked) < PUBLISH_EVERY {
+        return;
+    }
+    turn.state.condition.looked = turn.now;
+    let concerns = concerns::new_ones(turn.state, turn.now).into_iter();
+    turn.effects.extend(concerns.map(|it| Effect::Note(Notice::Concern { text: it.to_string() })));
 }
 
 /// Publishes the jobs that changed, and periodically all unfinished ones.

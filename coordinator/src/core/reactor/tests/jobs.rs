@@ -1,6 +1,6 @@
 //! Jobs: accepted, computed, stored, ended, cancelled, refused.
 
-use osteon_common::limits::JOBS_MAX;
+use osteon_common::limits::{CLIENT_SHARE_DIVISOR, JOBS_MAX};
 
 use super::*;
 
@@ -187,17 +187,27 @@ fn jobs_beyond_the_active_ones_wait_their_turn() {
 #[test]
 fn jobs_are_bounded() {
     let mut rig = Rig::new();
-    for _ in 0..JOBS_MAX {
-        let job = JobId(rig.state.next_job);
-        react(&mut rig.state, submit(1, "", propagation(1)), rig.now);
-        react(&mut rig.state, Event::Stored { job, key: RecordKey::Job }, rig.now);
+    let share = JOBS_MAX / CLIENT_SHARE_DIVISOR as usize;
+    for client in ["a", "b", "c", ""] {
+        for _ in 0..share {
+            let job = JobId(rig.state.next_job);
+            react(&mut rig.state, submit_of(client, 1, "", propagation(1)), rig.now);
+            react(&mut rig.state, Event::Stored { job, key: RecordKey::Job }, rig.now);
+        }
+        if client == "a" {
+            // The others still have their shares.
+            let refusal = "answer 1: 2500 jobs of the client \"a\" wait or run already, the most that one \
+                           client may have of the 10000 of all; submit again when some have ended, or \
+                           cancel some";
+            rig.check(submit_of("a", 1, "", propagation(1)), &[refusal]);
+        }
     }
-    let refusal = "answer 1: 10000 jobs wait or run already, the most allowed; submit again when \
-                   some have ended";
-    rig.check(submit(1, "", propagation(1)), &[refusal]);
+    let refusal = "answer 1: 10000 jobs of all clients wait or run already, the most allowed; submit again \
+                   when some have ended";
+    rig.check(submit_of("e", 1, "", propagation(1)), &[refusal]);
     rig.event(request(2, Request::Cancel(JobId(5))));
     rig.event(stored(5, RecordKey::End));
-    rig.check(submit(1, "", propagation(1)), &["store job 10001"]);
+    rig.check(submit_of("a", 1, "", propagation(1)), &["store job 10001"]);
 }
 
 #[test]
