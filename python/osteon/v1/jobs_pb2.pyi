@@ -235,8 +235,32 @@ class BannedWorker(_message.Message):
     elapsed_s: float
     def __init__(self, host: _Optional[str] = ..., process: _Optional[int] = ..., job: _Optional[str] = ..., reason: _Optional[str] = ..., elapsed_s: _Optional[float] = ...) -> None: ...
 
+class LiftBanRequest(_message.Message):
+    __slots__ = ("host",)
+    HOST_FIELD_NUMBER: _ClassVar[int]
+    host: str
+    def __init__(self, host: _Optional[str] = ...) -> None: ...
+
+class LiftBanResponse(_message.Message):
+    __slots__ = ("worker",)
+    WORKER_FIELD_NUMBER: _ClassVar[int]
+    worker: BannedWorker
+    def __init__(self, worker: _Optional[_Union[BannedWorker, _Mapping]] = ...) -> None: ...
+
+class RecheckRequest(_message.Message):
+    __slots__ = ("job",)
+    JOB_FIELD_NUMBER: _ClassVar[int]
+    job: str
+    def __init__(self, job: _Optional[str] = ...) -> None: ...
+
+class RecheckResponse(_message.Message):
+    __slots__ = ("snapshot",)
+    SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
+    snapshot: JobSnapshot
+    def __init__(self, snapshot: _Optional[_Union[JobSnapshot, _Mapping]] = ...) -> None: ...
+
 class JobSnapshot(_message.Message):
-    __slots__ = ("job", "kind", "state", "status", "reason", "evaluations", "max_evaluations", "realizations_done", "realizations", "best_cost", "best_mean", "best_coefficient_of_variation", "realizations_per_second", "workers", "elapsed_s", "waiting_for", "sequence", "failure", "client", "name", "priority", "submit_time", "end_time")
+    __slots__ = ("job", "kind", "state", "status", "reason", "evaluations", "max_evaluations", "realizations_done", "realizations", "best_cost", "best_mean", "best_coefficient_of_variation", "realizations_per_second", "workers", "elapsed_s", "waiting_for", "sequence", "failure", "client", "name", "priority", "submit_time", "end_time", "integrity")
     JOB_FIELD_NUMBER: _ClassVar[int]
     KIND_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
@@ -260,6 +284,7 @@ class JobSnapshot(_message.Message):
     PRIORITY_FIELD_NUMBER: _ClassVar[int]
     SUBMIT_TIME_FIELD_NUMBER: _ClassVar[int]
     END_TIME_FIELD_NUMBER: _ClassVar[int]
+    INTEGRITY_FIELD_NUMBER: _ClassVar[int]
     job: str
     kind: _specification_pb2.JobKind
     state: JobState
@@ -283,7 +308,8 @@ class JobSnapshot(_message.Message):
     priority: int
     submit_time: _timestamp_pb2.Timestamp
     end_time: _timestamp_pb2.Timestamp
-    def __init__(self, job: _Optional[str] = ..., kind: _Optional[_Union[_specification_pb2.JobKind, str]] = ..., state: _Optional[_Union[JobState, str]] = ..., status: _Optional[_Union[_results_pb2.JobStatus, str]] = ..., reason: _Optional[str] = ..., evaluations: _Optional[int] = ..., max_evaluations: _Optional[int] = ..., realizations_done: _Optional[int] = ..., realizations: _Optional[int] = ..., best_cost: _Optional[float] = ..., best_mean: _Optional[float] = ..., best_coefficient_of_variation: _Optional[float] = ..., realizations_per_second: _Optional[float] = ..., workers: _Optional[int] = ..., elapsed_s: _Optional[float] = ..., waiting_for: _Optional[str] = ..., sequence: _Optional[int] = ..., failure: _Optional[_Union[_results_pb2.JobFailureKind, str]] = ..., client: _Optional[str] = ..., name: _Optional[str] = ..., priority: _Optional[int] = ..., submit_time: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., end_time: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+    integrity: str
+    def __init__(self, job: _Optional[str] = ..., kind: _Optional[_Union[_specification_pb2.JobKind, str]] = ..., state: _Optional[_Union[JobState, str]] = ..., status: _Optional[_Union[_results_pb2.JobStatus, str]] = ..., reason: _Optional[str] = ..., evaluations: _Optional[int] = ..., max_evaluations: _Optional[int] = ..., realizations_done: _Optional[int] = ..., realizations: _Optional[int] = ..., best_cost: _Optional[float] = ..., best_mean: _Optional[float] = ..., best_coefficient_of_variation: _Optional[float] = ..., realizations_per_second: _Optional[float] = ..., workers: _Optional[int] = ..., elapsed_s: _Optional[float] = ..., waiting_for: _Optional[str] = ..., sequence: _Optional[int] = ..., failure: _Optional[_Union[_results_pb2.JobFailureKind, str]] = ..., client: _Optional[str] = ..., name: _Optional[str] = ..., priority: _Optional[int] = ..., submit_time: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., end_time: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., integrity: _Optional[str] = ...) -> None: ...
 
 class ListWorkersRequest(_message.Message):
     __slots__ = ()

@@ -97,6 +97,16 @@ class JobsStub(object):
                 request_serializer=osteon_dot_v1_dot_jobs__pb2.DrainWorkerRequest.SerializeToString,
                 response_deserializer=osteon_dot_v1_dot_jobs__pb2.DrainWorkerResponse.FromString,
                 _registered_method=True)
+        self.LiftBan = channel.unary_unary(
+                '/osteon.v1.Jobs/LiftBan',
+                request_serializer=osteon_dot_v1_dot_jobs__pb2.LiftBanRequest.SerializeToString,
+                response_deserializer=osteon_dot_v1_dot_jobs__pb2.LiftBanResponse.FromString,
+                _registered_method=True)
+        self.Recheck = channel.unary_unary(
+                '/osteon.v1.Jobs/Recheck',
+                request_serializer=osteon_dot_v1_dot_jobs__pb2.RecheckRequest.SerializeToString,
+                response_deserializer=osteon_dot_v1_dot_jobs__pb2.RecheckResponse.FromString,
+                _registered_method=True)
         self.Backup = channel.unary_stream(
                 '/osteon.v1.Jobs/Backup',
                 request_serializer=osteon_dot_v1_dot_jobs__pb2.BackupRequest.SerializeToString,
@@ -191,7 +201,7 @@ class JobsServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ListBans(self, request, context):
-        """Workers that were found to compute wrongly, and are refused. Errors: UNAVAILABLE.
+        """Hosts whose workers were found to compute wrongly, and are refused. Errors: UNAVAILABLE.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -208,6 +218,23 @@ class JobsServicer(object):
         """Sends a worker away: it gets no new batch, answers those it holds, and ends. Draining a worker
         that drains already changes nothing. Errors: NOT_FOUND (no worker with this number is attached;
         google.rpc.ResourceInfo of type `worker`), UNAVAILABLE.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def LiftBan(self, request, context):
+        """Lifts the ban of a host, so that its workers may attach again. Errors: NOT_FOUND (the host is not
+        banned; google.rpc.ResourceInfo of type `host`), INVALID_ARGUMENT, UNAVAILABLE.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Recheck(self, request, context):
+        """Computes an ended job again without the answers of a host that was banned after its end. It waits or
+        runs when this returns; watch it. One that was computed again already is not computed once more. Errors: NOT_FOUND, FAILED_PRECONDITION (it has
+        not ended, or no such host computed a part of it), UNAVAILABLE.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -282,6 +309,16 @@ def add_JobsServicer_to_server(servicer, server):
                     servicer.DrainWorker,
                     request_deserializer=osteon_dot_v1_dot_jobs__pb2.DrainWorkerRequest.FromString,
                     response_serializer=osteon_dot_v1_dot_jobs__pb2.DrainWorkerResponse.SerializeToString,
+            ),
+            'LiftBan': grpc.unary_unary_rpc_method_handler(
+                    servicer.LiftBan,
+                    request_deserializer=osteon_dot_v1_dot_jobs__pb2.LiftBanRequest.FromString,
+                    response_serializer=osteon_dot_v1_dot_jobs__pb2.LiftBanResponse.SerializeToString,
+            ),
+            'Recheck': grpc.unary_unary_rpc_method_handler(
+                    servicer.Recheck,
+                    request_deserializer=osteon_dot_v1_dot_jobs__pb2.RecheckRequest.FromString,
+                    response_serializer=osteon_dot_v1_dot_jobs__pb2.RecheckResponse.SerializeToString,
             ),
             'Backup': grpc.unary_stream_rpc_method_handler(
                     servicer.Backup,
@@ -594,6 +631,60 @@ class Jobs(object):
             '/osteon.v1.Jobs/DrainWorker',
             osteon_dot_v1_dot_jobs__pb2.DrainWorkerRequest.SerializeToString,
             osteon_dot_v1_dot_jobs__pb2.DrainWorkerResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def LiftBan(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/osteon.v1.Jobs/LiftBan',
+            osteon_dot_v1_dot_jobs__pb2.LiftBanRequest.SerializeToString,
+            osteon_dot_v1_dot_jobs__pb2.LiftBanResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Recheck(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/osteon.v1.Jobs/Recheck',
+            osteon_dot_v1_dot_jobs__pb2.RecheckRequest.SerializeToString,
+            osteon_dot_v1_dot_jobs__pb2.RecheckResponse.FromString,
             options,
             channel_credentials,
             insecure,

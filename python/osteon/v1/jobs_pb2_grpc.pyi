@@ -83,13 +83,22 @@ class JobsStub:
     forgotten then).
     """
     ListBans: _grpc.UnaryUnaryMultiCallable[_jobs_pb2.ListBansRequest, _jobs_pb2.ListBansResponse]
-    """Workers that were found to compute wrongly, and are refused. Errors: UNAVAILABLE."""
+    """Hosts whose workers were found to compute wrongly, and are refused. Errors: UNAVAILABLE."""
     ListWorkers: _grpc.UnaryUnaryMultiCallable[_jobs_pb2.ListWorkersRequest, _jobs_pb2.ListWorkersResponse]
     """Workers that are attached, and those that went last. Errors: UNAVAILABLE."""
     DrainWorker: _grpc.UnaryUnaryMultiCallable[_jobs_pb2.DrainWorkerRequest, _jobs_pb2.DrainWorkerResponse]
     """Sends a worker away: it gets no new batch, answers those it holds, and ends. Draining a worker
     that drains already changes nothing. Errors: NOT_FOUND (no worker with this number is attached;
     google.rpc.ResourceInfo of type `worker`), UNAVAILABLE.
+    """
+    LiftBan: _grpc.UnaryUnaryMultiCallable[_jobs_pb2.LiftBanRequest, _jobs_pb2.LiftBanResponse]
+    """Lifts the ban of a host, so that its workers may attach again. Errors: NOT_FOUND (the host is not
+    banned; google.rpc.ResourceInfo of type `host`), INVALID_ARGUMENT, UNAVAILABLE.
+    """
+    Recheck: _grpc.UnaryUnaryMultiCallable[_jobs_pb2.RecheckRequest, _jobs_pb2.RecheckResponse]
+    """Computes an ended job again without the answers of a host that was banned after its end. It waits or
+    runs when this returns; watch it. One that was computed again already is not computed once more. Errors: NOT_FOUND, FAILED_PRECONDITION (it has
+    not ended, or no such host computed a part of it), UNAVAILABLE.
     """
     Backup: _grpc.UnaryStreamMultiCallable[_jobs_pb2.BackupRequest, _jobs_pb2.BackupResponse]
     """A copy of the store as of one moment, while the coordinator runs: parts of a SQLite file in order,
@@ -155,13 +164,22 @@ class JobsAsyncStub(JobsStub):
     forgotten then).
     """
     ListBans: _aio.UnaryUnaryMultiCallable[_jobs_pb2.ListBansRequest, _jobs_pb2.ListBansResponse]  # type: ignore[assignment]
-    """Workers that were found to compute wrongly, and are refused. Errors: UNAVAILABLE."""
+    """Hosts whose workers were found to compute wrongly, and are refused. Errors: UNAVAILABLE."""
     ListWorkers: _aio.UnaryUnaryMultiCallable[_jobs_pb2.ListWorkersRequest, _jobs_pb2.ListWorkersResponse]  # type: ignore[assignment]
     """Workers that are attached, and those that went last. Errors: UNAVAILABLE."""
     DrainWorker: _aio.UnaryUnaryMultiCallable[_jobs_pb2.DrainWorkerRequest, _jobs_pb2.DrainWorkerResponse]  # type: ignore[assignment]
     """Sends a worker away: it gets no new batch, answers those it holds, and ends. Draining a worker
     that drains already changes nothing. Errors: NOT_FOUND (no worker with this number is attached;
     google.rpc.ResourceInfo of type `worker`), UNAVAILABLE.
+    """
+    LiftBan: _aio.UnaryUnaryMultiCallable[_jobs_pb2.LiftBanRequest, _jobs_pb2.LiftBanResponse]  # type: ignore[assignment]
+    """Lifts the ban of a host, so that its workers may attach again. Errors: NOT_FOUND (the host is not
+    banned; google.rpc.ResourceInfo of type `host`), INVALID_ARGUMENT, UNAVAILABLE.
+    """
+    Recheck: _aio.UnaryUnaryMultiCallable[_jobs_pb2.RecheckRequest, _jobs_pb2.RecheckResponse]  # type: ignore[assignment]
+    """Computes an ended job again without the answers of a host that was banned after its end. It waits or
+    runs when this returns; watch it. One that was computed again already is not computed once more. Errors: NOT_FOUND, FAILED_PRECONDITION (it has
+    not ended, or no such host computed a part of it), UNAVAILABLE.
     """
     Backup: _aio.UnaryStreamMultiCallable[_jobs_pb2.BackupRequest, _jobs_pb2.BackupResponse]  # type: ignore[assignment]
     """A copy of the store as of one moment, while the coordinator runs: parts of a SQLite file in order,
@@ -278,7 +296,7 @@ class JobsServicer(metaclass=_abc_1.ABCMeta):
         request: _jobs_pb2.ListBansRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_jobs_pb2.ListBansResponse, _abc.Awaitable[_jobs_pb2.ListBansResponse]]:
-        """Workers that were found to compute wrongly, and are refused. Errors: UNAVAILABLE."""
+        """Hosts whose workers were found to compute wrongly, and are refused. Errors: UNAVAILABLE."""
 
     @_abc_1.abstractmethod
     def ListWorkers(
@@ -297,6 +315,27 @@ class JobsServicer(metaclass=_abc_1.ABCMeta):
         """Sends a worker away: it gets no new batch, answers those it holds, and ends. Draining a worker
         that drains already changes nothing. Errors: NOT_FOUND (no worker with this number is attached;
         google.rpc.ResourceInfo of type `worker`), UNAVAILABLE.
+        """
+
+    @_abc_1.abstractmethod
+    def LiftBan(
+        self,
+        request: _jobs_pb2.LiftBanRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_jobs_pb2.LiftBanResponse, _abc.Awaitable[_jobs_pb2.LiftBanResponse]]:
+        """Lifts the ban of a host, so that its workers may attach again. Errors: NOT_FOUND (the host is not
+        banned; google.rpc.ResourceInfo of type `host`), INVALID_ARGUMENT, UNAVAILABLE.
+        """
+
+    @_abc_1.abstractmethod
+    def Recheck(
+        self,
+        request: _jobs_pb2.RecheckRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_jobs_pb2.RecheckResponse, _abc.Awaitable[_jobs_pb2.RecheckResponse]]:
+        """Computes an ended job again without the answers of a host that was banned after its end. It waits or
+        runs when this returns; watch it. One that was computed again already is not computed once more. Errors: NOT_FOUND, FAILED_PRECONDITION (it has
+        not ended, or no such host computed a part of it), UNAVAILABLE.
         """
 
     @_abc_1.abstractmethod

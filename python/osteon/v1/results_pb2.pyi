@@ -393,7 +393,7 @@ class NominalSampling(_message.Message):
     def __init__(self, band: _Optional[float] = ..., period: _Optional[float] = ..., pairs: _Optional[int] = ...) -> None: ...
 
 class JobResult(_message.Message):
-    __slots__ = ("status", "failure", "reason", "digest", "best", "data", "sensitivities", "identified", "profiles", "solutions", "objective", "search", "evaluations", "realizations", "seed", "sampling", "scrambles", "control_variate", "solver", "nominal_sampling", "picking", "version", "numerics", "commit", "posterior")
+    __slots__ = ("status", "failure", "reason", "digest", "best", "data", "sensitivities", "identified", "profiles", "solutions", "objective", "search", "evaluations", "realizations", "seed", "sampling", "scrambles", "control_variate", "solver", "nominal_sampling", "picking", "version", "numerics", "commit", "posterior", "integrity")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     FAILURE_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
@@ -419,6 +419,7 @@ class JobResult(_message.Message):
     NUMERICS_FIELD_NUMBER: _ClassVar[int]
     COMMIT_FIELD_NUMBER: _ClassVar[int]
     POSTERIOR_FIELD_NUMBER: _ClassVar[int]
+    INTEGRITY_FIELD_NUMBER: _ClassVar[int]
     status: JobStatus
     failure: JobFailureKind
     reason: str
@@ -444,7 +445,16 @@ class JobResult(_message.Message):
     numerics: int
     commit: str
     posterior: Posterior
-    def __init__(self, status: _Optional[_Union[JobStatus, str]] = ..., failure: _Optional[_Union[JobFailureKind, str]] = ..., reason: _Optional[str] = ..., digest: _Optional[str] = ..., best: _Optional[_Union[BestPoint, _Mapping]] = ..., data: _Optional[_Union[DataSummary, _Mapping]] = ..., sensitivities: _Optional[_Iterable[_Union[Sensitivity, _Mapping]]] = ..., identified: _Optional[_Union[Identified, _Mapping]] = ..., profiles: _Optional[_Iterable[_Union[Profile, _Mapping]]] = ..., solutions: _Optional[_Union[Solutions, _Mapping]] = ..., objective: _Optional[_Union[_specification_pb2.Objective, _Mapping]] = ..., search: _Optional[_Union[_specification_pb2.Search, _Mapping]] = ..., evaluations: _Optional[int] = ..., realizations: _Optional[int] = ..., seed: _Optional[int] = ..., sampling: _Optional[_Union[_specification_pb2.Sampling, str]] = ..., scrambles: _Optional[int] = ..., control_variate: bool = ..., solver: _Optional[_Union[_specification_pb2.SolverSettings, _Mapping]] = ..., nominal_sampling: _Optional[_Union[NominalSampling, _Mapping]] = ..., picking: _Optional[_Union[_specification_pb2.Picking, _Mapping]] = ..., version: _Optional[str] = ..., numerics: _Optional[int] = ..., commit: _Optional[str] = ..., posterior: _Optional[_Union[Posterior, _Mapping]] = ...) -> None: ...
+    integrity: Integrity
+    def __init__(self, status: _Optional[_Union[JobStatus, str]] = ..., failure: _Optional[_Union[JobFailureKind, str]] = ..., reason: _Optional[str] = ..., digest: _Optional[str] = ..., best: _Optional[_Union[BestPoint, _Mapping]] = ..., data: _Optional[_Union[DataSummary, _Mapping]] = ..., sensitivities: _Optional[_Iterable[_Union[Sensitivity, _Mapping]]] = ..., identified: _Optional[_Union[Identified, _Mapping]] = ..., profiles: _Optional[_Iterable[_Union[Profile, _Mapping]]] = ..., solutions: _Optional[_Union[Solutions, _Mapping]] = ..., objective: _Optional[_Union[_specification_pb2.Objective, _Mapping]] = ..., search: _Optional[_Union[_specification_pb2.Search, _Mapping]] = ..., evaluations: _Optional[int] = ..., realizations: _Optional[int] = ..., seed: _Optional[int] = ..., sampling: _Optional[_Union[_specification_pb2.Sampling, str]] = ..., scrambles: _Optional[int] = ..., control_variate: bool = ..., solver: _Optional[_Union[_specification_pb2.SolverSettings, _Mapping]] = ..., nominal_sampling: _Optional[_Union[NominalSampling, _Mapping]] = ..., picking: _Optional[_Union[_specification_pb2.Picking, _Mapping]] = ..., version: _Optional[str] = ..., numerics: _Optional[int] = ..., commit: _Optional[str] = ..., posterior: _Optional[_Union[Posterior, _Mapping]] = ..., integrity: _Optional[_Union[Integrity, _Mapping]] = ...) -> None: ...
+
+class Integrity(_message.Message):
+    __slots__ = ("banned_hosts", "earlier_digest")
+    BANNED_HOSTS_FIELD_NUMBER: _ClassVar[int]
+    EARLIER_DIGEST_FIELD_NUMBER: _ClassVar[int]
+    banned_hosts: _containers.RepeatedScalarFieldContainer[str]
+    earlier_digest: str
+    def __init__(self, banned_hosts: _Optional[_Iterable[str]] = ..., earlier_digest: _Optional[str] = ...) -> None: ...
 
 class GroupResult(_message.Message):
     __slots__ = ("group", "name", "status", "reason", "best", "data", "sensitivities", "identified", "profiles", "solutions", "posterior")
