@@ -149,6 +149,22 @@ pub(crate) fn voters(state: &State, setup: &SetupKey, now: Duration) -> usize {
     awaited.chain(proofs.ballot.hosts()).collect::<BTreeSet<_>>().len()
 }
 
+/// Returns the attempts at evaluations of a job whose results come from workers without a proof that the
+/// majority confirms. They are not saved: after a restart nobody would know that they do not count yet.
+pub(crate) fn unproven_attempts(state: &State, job: JobId, now: Duration) -> BTreeSet<u64> {
+    let Some(job) = state.jobs.get(&job) else {
+        return BTreeSet::new();
+    };
+    let Some(proofs) = state.proofs.of(&job.setup) else {
+        return BTreeSet::new();
+    };
+    let voters = voters(state, &job.setup, now);
+    let confirms =
+        |name: &WorkerName| proofs.is_given_by(name) && proofs.ballot.confirms(name.host(), voters);
+    let unproven = job.certain().filter(|evaluation| !evaluation.workers.iter().all(confirms));
+    unproven.map(|evaluation| evaluation.attempt).collect()
+}
+
 /// What the results of a worker need before they count.
 enum Need {
     Nothing,

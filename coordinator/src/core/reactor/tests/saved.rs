@@ -57,6 +57,30 @@ fn filled(rig: &Rig) -> u64 {
 }
 
 #[test]
+fn answers_of_unproven_workers_are_not_saved() {
+    let mut rig = Rig::new();
+    (rig.state.config.proofs, rig.state.config.audit_fraction) = (true, 0.0);
+    rig.accept(propagation(100));
+    rig.event(hello_of(1, 1, 1));
+    rig.event(hello_of(2, 2, 1));
+    let saved = |rig: &mut Rig| {
+        rig.now += Duration::from_secs(2);
+        let effects = react(&mut rig.state, Event::Tick, rig.now);
+        effects.iter().any(|effect| matches!(effect, Effect::Store(Record::Part(_))))
+    };
+    // Worker 1 had its batch before anybody could check it; now it owes a proof.
+    rig.event(answer(1, 1, 0, 4));
+    saved(&mut rig);
+    assert!(!saved(&mut rig), "what may be wrong was saved");
+    let proofs: Vec<(u64, u64)> =
+        rig.state.workers.iter().map(|(id, worker)| (id.0, worker.proofs[0].0)).collect();
+    for (worker, batch) in proofs {
+        rig.event(answer(worker, batch, 0, 1));
+    }
+    assert!(saved(&mut rig) || saved(&mut rig));
+}
+
+#[test]
 fn a_restart_repeats_only_what_was_answered_last() {
     let (mut rig, answered) = rig();
     let mut store = MemoryStore::new();
