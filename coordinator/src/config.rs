@@ -8,7 +8,7 @@ use osteon_common::limits::{
 
 use crate::core::audit::AuditKey;
 
-/// Default fraction of the batches that are computed by a second worker too.
+/// Default fraction of the realizations that another host computes too.
 pub const AUDIT_FRACTION: f64 = 0.01;
 
 /// Settings of a coordinator. None of them changes a bit of any result.
@@ -25,7 +25,7 @@ pub struct Config {
     pub answer_timeout: Duration,
     /// Computing time that a batch should take.
     pub batch_target: Duration,
-    /// Fraction of the batches that are computed by a second worker too, 0 to 1.
+    /// Fraction of the realizations that another host computes too, 0 to 1.
     pub audit_fraction: f64,
     /// Decides which batches are audited; a running coordinator draws its own key.
     pub audit_key: AuditKey,

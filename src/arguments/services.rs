@@ -43,7 +43,7 @@ pub(crate) struct CoordinatorArguments {
     /// File with an additional client token, which has the role admin
     #[arg(long, value_name = "FILE")]
     pub(crate) token_file: Option<PathBuf>,
-    /// Fraction (0 to 1) of the batches that a second worker also computes, to detect workers that
+    /// Fraction (0 to 1) of the realizations that another host also computes, to detect machines that
     /// return wrong results
     #[arg(long, value_name = "F", default_value_t = osteon_coordinator::config::AUDIT_FRACTION,
           value_parser = fraction)]

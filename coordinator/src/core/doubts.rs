@@ -1,13 +1,8 @@
 //! Doubts about results: a host that computed a part of an ended job was banned later. Such a job can be
 //! computed again without the answers of that host.
 
-use std::time::Duration;
-
 use osteon_common::results::Integrity;
 
-use crate::core::ids::JobId;
-use crate::core::job::sequence;
-use crate::core::state::State;
 use crate::store::DoubtRecord;
 
 /// The doubts about a job.
@@ -49,38 +44,22 @@ impl Doubts {
         }
     }
 
-    /// Describes it in a sentence; empty if there is no doubt.
-    pub(crate) fn statement(&self, state: &State) -> String {
+    /// Describes it in a sentence; empty if there is no doubt. `host_of` returns the host of a ban.
+    pub(crate) fn statement(&self, host_of: impl Fn(u64) -> Option<String>) -> String {
         let digest = self.digest.as_deref().unwrap_or_default();
-        self.integrity(state).map_or_else(String::new, |it| it.statement(digest))
+        self.integrity(host_of).map_or_else(String::new, |it| it.statement(digest))
     }
 
     /// Returns what a result says about it.
-    pub(crate) fn integrity(&self, state: &State) -> Option<Integrity> {
-        let of = |ban: &u64| {
-            let found = state.banned.iter().find(|it| it.record.number == *ban)?;
-            Some(found.record.worker.host().to_owned())
-        };
+    pub(crate) fn integrity(&self, host_of: impl Fn(u64) -> Option<String>) -> Option<Integrity> {
         let (open, settled): (Vec<_>, Vec<_>) =
             self.bans.iter().partition(|(_, before)| before.is_none());
         let concerned = if open.is_empty() { settled } else { open };
         let mut banned_hosts: Vec<String> =
-            concerned.iter().filter_map(|(ban, _)| of(ban)).collect();
+            concerned.iter().filter_map(|(ban, _)| host_of(*ban)).collect();
         banned_hosts.sort_unstable();
         banned_hosts.dedup();
         let (_, earlier_digest) = concerned.last()?;
         Some(Integrity { banned_hosts, earlier_digest: (*earlier_digest).clone() })
-    }
-}
-
-/// Notes that ended jobs are doubtful because of a ban.
-pub(crate) fn note(state: &mut State, ban: u64, jobs: Vec<JobId>, now: Duration) {
-    for job in jobs {
-        if let Some(ended) = state.ended.get_mut(&job) {
-            ended.doubts.add(DoubtRecord { job, ban, digest: None });
-            ended.sequence = sequence(ended.sequence, now);
-            tracing::error!(%job, ban, "a host that computed a part of this ended job was banned; compute the \
-                job again with `osteon recheck`");
-        }
     }
 }

@@ -84,7 +84,7 @@ pub(crate) fn search_rows(state: &State, id: JobId, from: u64, limit: usize) -> 
 /// Returns the end of an ended job.
 pub(crate) fn end(state: &State, id: JobId) -> Answer {
     if let Some(ended) = state.ended.get(&id) {
-        let integrity = ended.doubts.integrity(state);
+        let integrity = ended.doubts.integrity(|ban| state.host_of_ban(ban));
         return Answer::Ended { end: ended.end.clone(), integrity };
     }
     match state.jobs.get(&id).map(|job| &job.stage) {

@@ -15,7 +15,6 @@
 
 use std::time::Duration;
 
-use crate::core::doubts;
 use crate::core::effect::{Effect, RecordKey};
 use crate::core::event::Event;
 use crate::core::state::State;
@@ -76,7 +75,7 @@ fn apply(turn: &mut Turn, event: Event) {
         Event::Read { job, number, found } => replay::read(turn, job, number, found),
         Event::Pruned { reply_id, jobs, outcome } => prune::pruned(turn, reply_id, jobs, outcome),
         Event::Doubted { ban, jobs } => {
-            doubts::note(turn.state, ban, jobs, turn.now);
+            recheck::note_doubts(turn, ban, jobs);
         }
         Event::Reopened { reply_id, job, outcome } => {
             recheck::reopened(turn, reply_id, job, outcome)

@@ -84,7 +84,7 @@ fn ended(state: &State, job: &EndedJob) -> JobSnapshot {
         priority: job.priority,
         submit_time: Some(timestamp::to_message(job.accepted)),
         end_time: Some(timestamp::to_message(end.ended)),
-        integrity: job.doubts.statement(state),
+        integrity: job.doubts.statement(|ban| state.host_of_ban(ban)),
         ..JobSnapshot::default()
     };
     snapshot.set_state(JobState::Ended);

@@ -331,6 +331,12 @@ impl State {
         records.into_iter().find(|record| record.lifted.is_none())
     }
 
+    /// Returns the host of the ban with this number.
+    pub(crate) fn host_of_ban(&self, number: u64) -> Option<String> {
+        let found = self.banned.iter().find(|banned| banned.record.number == number)?;
+        Some(found.record.worker.host().to_owned())
+    }
+
     /// Returns whether the answers of a worker in a job may be wrong: its host was found to compute wrongly
     /// after the job had been accepted. That the host has been repaired since changes nothing.
     pub(crate) fn is_doubtful(&self, name: &WorkerName, job: &JobRecord) -> bool {

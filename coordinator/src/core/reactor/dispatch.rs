@@ -27,6 +27,7 @@ pub(super) mod departures;
 mod duplicates;
 mod eta;
 mod idle;
+pub(super) mod new_proof;
 pub(super) mod overdue;
 pub(super) mod poison;
 pub(super) mod proofs;

@@ -3,11 +3,9 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use osteon_common::parameters::Point;
-
-use super::{batches, overdue};
+use super::overdue;
 use crate::core::audit;
-use crate::core::ballot::{Ballot, VOTERS_MAX};
+use crate::core::ballot::VOTERS_MAX;
 use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::effect::Effect;
 use crate::core::evaluation::{Audit, PendingEvaluation};
@@ -57,32 +55,6 @@ fn begin(turn: &mut Turn, id: JobId, setup: SetupKey) -> bool {
     true
 }
 
-/// Has all workers prove themselves by one realization of an evaluation about which hosts differ.
-pub(crate) fn replace(turn: &mut Turn, (id, point): (JobId, Point), index: u64, votes: &Ballot) {
-    let attempt = turn.state.new_attempt();
-    let known = turn.state.jobs.get(&id).filter(|_| turn.state.config.proofs);
-    let Some(setup) = known.map(|job| job.setup) else {
-        return;
-    };
-    let Some(input) = turn.state.input(id, attempt, point) else {
-        return;
-    };
-    let out = turn.state.proofs.of(&setup).map(|proofs| proofs.out.clone()).unwrap_or_default();
-    for batch in out.into_values() {
-        batches::revoke(turn, batch);
-    }
-    turn.state.proofs.replace(setup, (input, votes.about(index)), turn.now);
-    let mut waiting = Vec::new();
-    for (worker, attached) in &mut turn.state.workers {
-        attached.proven.remove(&setup);
-        if !attached.early.is_empty() {
-            waiting.push(*worker);
-        }
-    }
-    // Their answers wait for it.
-    waiting.into_iter().for_each(|worker| ask(turn, worker, id));
-}
-
 /// Asks hosts that have not voted, until so many have, or are asked.
 fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) {
     let Some(setup) = turn.state.jobs.get(&job).map(|job| job.setup) else {
@@ -107,7 +79,7 @@ fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) {
 }
 
 /// Sends a worker the batch by which it proves itself, unless it has it.
-fn ask(turn: &mut Turn, worker: WorkerId, job: JobId) {
+pub(super) fn ask(turn: &mut Turn, worker: WorkerId, job: JobId) {
     let Some(setup) = turn.state.jobs.get(&job).map(|job| job.setup) else {
         return;
     };

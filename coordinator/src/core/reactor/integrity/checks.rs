@@ -16,7 +16,7 @@ use crate::core::failure::{RunFailure, shown};
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::Job;
 use crate::core::proofs::SetupKey;
-use crate::core::reactor::dispatch::{audits, batches, overdue, poison, proofs};
+use crate::core::reactor::dispatch::{audits, batches, new_proof, overdue, poison, proofs};
 use crate::core::reactor::lifecycle::jobs;
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
@@ -199,7 +199,7 @@ fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
         batches::revoke(turn, tie_breaker);
     }
     if let Some(found) = verdict.outvoted.first() {
-        proofs::replace(turn, (job, point), found.index, &ballot);
+        new_proof::replace(turn, (job, point), found.index, &ballot);
     }
     ban_outvoted(turn, job, verdict);
 }
@@ -247,7 +247,7 @@ pub(crate) fn give_up(turn: &mut Turn) {
             if let Some((RunFailure::Contradiction { contradiction, point }, ballot)) =
                 Some(&failure).zip(ballot)
             {
-                proofs::replace(turn, (job, *point), contradiction.index, &ballot);
+                new_proof::replace(turn, (job, *point), contradiction.index, &ballot);
             }
             jobs::fail(turn, job, &failure);
         }

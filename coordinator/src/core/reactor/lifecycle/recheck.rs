@@ -3,12 +3,24 @@
 
 use crate::core::effect::{Answer, Effect, Refusal};
 use crate::core::ids::{JobId, ReplyId};
-use crate::core::job::{Job, Stage};
+use crate::core::job::{Job, Stage, sequence};
 use crate::core::reactor::turn::Turn;
 use crate::core::snapshot;
-use crate::store::StoredJob;
+use crate::store::{DoubtRecord, StoredJob};
 
 use super::jobs;
+
+/// Notes that ended jobs are doubtful because of a ban.
+pub(crate) fn note_doubts(turn: &mut Turn, ban: u64, jobs: Vec<JobId>) {
+    for job in jobs {
+        if let Some(ended) = turn.state.ended.get_mut(&job) {
+            ended.doubts.add(DoubtRecord { job, ban, digest: None });
+            ended.sequence = sequence(ended.sequence, turn.now);
+            tracing::error!(%job, ban, "a host that computed a part of this ended job is banned; compute the \
+                job again with `osteon recheck`");
+        }
+    }
+}
 
 /// Begins a job again that has ended; the client is answered when that is durable.
 pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, id: JobId) -> Option<Answer> {
