@@ -82,7 +82,7 @@ fn a_refusal_names_the_key_that_reads_the_file() {
         let message = read_as(bytes, more).unwrap_err();
         assert!(message.contains(expected), "{message}");
     };
-    check(b"a;velocity\n1;3900\n", "", "if its fields are separated so: [data] separator = \";\"");
+    check(b"a;velocity\n1;3900\n", "", "this reads it: [data] separator = \";\"");
     check(b"a\tvelocity\n1\t3900\n", "", "[data] separator = \"tab\"");
     check(b"a;velocity\n1;3900,5\n", "separator = \";\"", "[data] decimal = \",\"");
     check(b"a,FAS Velocity\n1,3900\n", "", "[data] column = \"FAS Velocity\"");
@@ -93,7 +93,7 @@ fn a_refusal_names_the_key_that_reads_the_file() {
         "",
         "[data] encoding = \"windows-1252\" (Western Europe, Latin-1), \"utf-16le\"",
     );
-    check(b"velocity\n3900,5\n", "", "quote them, or separate fields by semicolons");
+    check(b"velocity\n3900,5\n", "", "this reads it: [data] separator = \";\", decimal = \",\"");
     let ok = b"velocity\n3900\n3910\n";
     check(
         ok,
