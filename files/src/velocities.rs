@@ -153,73 +153,93 @@ fn gather(
     columns: &Columns<'_>,
     named: &NamedColumns<'_>,
 ) -> Result<CollectedVelocities, Vec<LocatedProblem>> {
-    let mut gathered = CollectedVelocities::new(named.subject.is_some(), table);
-    let mut problems = Vec::new();
-    // Lines below the table are none of its rows; if a row follows, they are wrong rows.
-    let mut below: Vec<(usize, Vec<String>)> = Vec::new();
+    let gathered = CollectedVelocities::new(named.subject.is_some(), table);
+    let mut reading = Reading { table, columns, gathered, problems: Vec::new(), below: Vec::new() };
     for line in Lines::of(&table.content.text, &table.header, Some(table.place())) {
-        // After this error, the rest of the file cannot be interpreted.
-        let (number, line) = line.map_err(|problem| {
-            let mut problems = std::mem::take(&mut problems);
-            problems.push(problem);
-            problems
-        })?;
-        let found = match line {
-            Line::Rule => Ok(()),
-            Line::OpenQuote => Err(Problem::Quote),
-            Line::Units(_) => {
-                gathered.account.leave_out(number, "(units)");
-                Ok(())
+        let read =
+            line.map_err(|(line, problem)| (line, problem, true)).and_then(|(number, line)| {
+                reading.line(number, line).map_err(|problem| {
+                    let is_final = problem.is_final();
+                    (Some(number).filter(|_| !is_final), problem, is_final)
+                })
+            });
+        if let Err((line, problem, is_final)) = read {
+            reading.problems.push((line, problem));
+            // After this error, the rest of the file cannot be interpreted, or no later row can mend it.
+            if is_final {
+                return Err(reading.problems);
             }
-            Line::RepeatedHeader => {
-                gathered.account.leave_out(number, "(the header again)");
-                Ok(())
-            }
-            Line::OtherShape(fields) | Line::Labelled { fields, .. } | Line::Data(fields) => {
-                match table.summaries.get(&number) {
-                    Some(shown) => {
-                        gathered.account.leave_out(number, shown);
-                        Ok(())
-                    }
-                    None if fields.len() == table.names().len() => {
-                        problems.extend(
-                            below.drain(..).map(|(line, fields)| wrong_shape(table, line, &fields)),
-                        );
-                        gathered.row(number, fields, columns)
-                    }
-                    None if table.is_below(&fields) && below.len() < BELOW_MAX => {
-                        below.push((number, fields));
-                        Ok(())
-                    }
-                    None => Err(wrong_shape(table, number, &fields).1),
-                }
-            }
-        };
-        match found {
-            Ok(()) => {}
-            // No later row can mend that.
-            Err(problem) if problem.is_final() => return Err(vec![(None, problem)]),
-            Err(problem) => problems.push((Some(number), problem)),
         }
-        if problems.len() > REPORTED_MAX {
-            problems.truncate(REPORTED_MAX);
-            problems.push((None, Problem::More));
-            return Err(problems);
+        if reading.problems.len() > REPORTED_MAX {
+            reading.problems.truncate(REPORTED_MAX);
+            reading.problems.push((None, Problem::More));
+            return Err(reading.problems);
         }
     }
-    for (line, fields) in below {
-        let text = fields.iter().find(|field| !field.is_empty()).map_or("", String::as_str);
-        gathered.account.leave_out(line, &format!("{:?}", shortened(text)));
-    }
-    if problems.is_empty() && gathered.count < VELOCITIES_MIN {
-        problems.push((None, if gathered.count == 0 { Problem::NoRows } else { Problem::OneRow }));
-    }
-    if problems.is_empty() { Ok(gathered) } else { Err(problems) }
+    reading.finish()
 }
 
-fn wrong_shape(table: &Table, line: usize, fields: &[String]) -> LocatedProblem {
-    let (found, expected) = (fields.len(), table.names().len());
-    (Some(line), Problem::FieldCount { found, expected })
+/// The rows of a table while they are read.
+struct Reading<'a> {
+    table: &'a Table,
+    columns: &'a Columns<'a>,
+    gathered: CollectedVelocities,
+    problems: Vec<LocatedProblem>,
+    /// Lines that seem to stand below the table; if a velocity follows, they are wrong rows.
+    below: Vec<(usize, Vec<String>)>,
+}
+
+impl Reading<'_> {
+    fn line(&mut self, number: usize, line: Line) -> Result<(), Problem> {
+        let account = &mut self.gathered.account;
+        let fields = match line {
+            Line::Rule => return Ok(()),
+            Line::OpenQuote => return Err(Problem::Quote),
+            Line::Units(_) => {
+                account.leave_out(number, "(units)");
+                return Ok(());
+            }
+            Line::RepeatedHeader => {
+                account.leave_out(number, "(the header again)");
+                return Ok(());
+            }
+            Line::OtherShape(fields) | Line::Labelled { fields, .. } | Line::Data(fields) => fields,
+        };
+        if let Some(shown) = self.table.summaries.get(&number) {
+            account.leave_out(number, shown);
+            return Ok(());
+        }
+        if fields.len() == self.table.names().len() {
+            if self.gathered.row(number, fields, self.columns)? {
+                let below = self.below.drain(..);
+                self.problems.extend(
+                    below.map(|(line, fields)| (Some(line), wrong_shape(self.table, &fields))),
+                );
+            }
+            return Ok(());
+        }
+        match self.table.is_below(&fields) && self.below.len() < BELOW_MAX {
+            true => self.below.push((number, fields)),
+            false => return Err(wrong_shape(self.table, &fields)),
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<CollectedVelocities, Vec<LocatedProblem>> {
+        for (line, fields) in self.below {
+            let text = fields.iter().find(|field| !field.is_empty()).map_or("", String::as_str);
+            self.gathered.account.leave_out(line, &format!("{:?}", shortened(text)));
+        }
+        let count = self.gathered.count;
+        if self.problems.is_empty() && count < VELOCITIES_MIN {
+            self.problems.push((None, if count == 0 { Problem::NoRows } else { Problem::OneRow }));
+        }
+        if self.problems.is_empty() { Ok(self.gathered) } else { Err(self.problems) }
+    }
+}
+
+fn wrong_shape(table: &Table, fields: &[String]) -> Problem {
+    Problem::FieldCount { found: fields.len(), expected: table.names().len() }
 }
 
 /// Returns the keys that read a file which a job does not, at the end of a message.

@@ -66,20 +66,20 @@ impl CollectedVelocities {
         }
     }
 
-    /// Takes the row in a line, or leaves it out if a value is missing.
+    /// Takes the row in a line, or leaves it out if a value is missing; returns whether it was taken.
     pub(super) fn row(
         &mut self,
         line: usize,
         fields: Vec<String>,
         columns: &Columns<'_>,
-    ) -> Result<(), Problem> {
+    ) -> Result<bool, Problem> {
         let Some(row) = columns.row(fields)? else {
             self.left_out += 1;
-            return Ok(());
+            return Ok(false);
         };
         match self.contradiction(&row, columns) {
             Some(problem) => Err(problem),
-            None => self.add(line, row),
+            None => self.add(line, row).map(|()| true),
         }
     }
 

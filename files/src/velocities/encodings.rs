@@ -123,7 +123,16 @@ fn detected(bytes: &[u8]) -> Result<Option<&'static Encoding>, Problem> {
     };
     // A word of velocities beyond ASCII can be read in one encoding only.
     let by_word = LEGACY.iter().find(reads).copied();
+    let by_word = by_word.or_else(|| has_only_signs(bytes).then_some(WINDOWS_1252));
     by_word.or_else(|| guessed(bytes)).map(Some).ok_or(Problem::UnknownEncoding)
+}
+
+/// Returns whether the only bytes beyond ASCII are signs of measurement by themselves: ± ° µ · and the blank that does
+/// not break, which most encodings of one byte have in common.
+fn has_only_signs(bytes: &[u8]) -> bool {
+    let is_sign = |byte: u8| matches!(byte, 0xa0 | 0xb0 | 0xb1 | 0xb5 | 0xb7);
+    let is_alone = bytes.windows(2).all(|pair| pair[0].is_ascii() || pair[1].is_ascii());
+    is_alone && bytes.iter().all(|&byte| byte.is_ascii() || is_sign(byte))
 }
 
 /// Returns whether a text names velocities by a word beyond ASCII.

@@ -7,7 +7,7 @@ use super::names::ColumnName;
 use super::number::Number;
 use super::problem::{LocatedProblem, Problem};
 use super::text_lines::{Record, Records};
-use super::units::{self, Unit};
+use super::units;
 
 /// Number of records in which the header is looked for.
 const RECORDS_MAX: usize = 1000;
@@ -58,19 +58,14 @@ pub(super) fn is_number(cell: &str) -> bool {
     DecimalMark::ALL.into_iter().any(|mark| Number::read(cell, mark).is_some())
 }
 
-/// Returns whether fields are the units of columns rather than values of a row.
-pub(super) fn are_units(fields: &[String]) -> bool {
+/// Returns whether fields are the units of columns rather than values of a row, given the places of
+/// velocities.
+pub(super) fn are_units(fields: &[String], places: &[usize]) -> bool {
     let is_none = |field: &str| field.trim_matches(['-', ' ', '[', ']', '(', ')']).is_empty();
-    let mut has_unit = false;
-    let mut has_other = false;
-    for field in fields {
-        match units::of_text(field) {
-            Some(Unit::Velocity(_) | Unit::OtherVelocity) => return true,
-            Some(Unit::Other) => has_unit = true,
-            None => has_other |= !is_none(field),
-        }
-    }
-    has_unit && !has_other
+    let of_place = |&place: &usize| units::of_velocity(fields.get(place)?);
+    let has_unit = fields.iter().any(|field| units::of_text(field).is_some());
+    places.iter().find_map(of_place).is_some()
+        || has_unit && fields.iter().all(|field| is_none(field) || units::of_text(field).is_some())
 }
 
 /// Returns whether fields are a line that is drawn, as below a header.
@@ -201,38 +196,51 @@ fn found(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
     let above = above_of(&content.text);
     let named = content.separator().or(format.separator).or(above);
     let separators = named.map_or_else(|| Separator::ALL.to_vec(), |one| vec![one]);
-    let mut best: Option<(usize, usize, Header)> = None;
-    let mut fallback: Option<(usize, usize, Header)> = None;
+    let mut best = None;
+    let mut fallback = None;
     let mut first_problem = None;
     for separator in separators {
         let beginning = Beginning::of(&content.text, separator, skipped)?;
-        let better = |one: &Option<(usize, usize, Header)>, score, width| {
-            one.as_ref().is_none_or(|best| (score, width) > (best.0, best.1))
-        };
         match beginning.header() {
-            Ok(Some((score, header))) if better(&best, score, header.names.len()) => {
-                best = Some((score, header.names.len(), header));
-            }
+            Ok(Some((score, header))) => keep_better(&mut best, score, header),
             Err(problem) => first_problem = first_problem.or(Some(problem)),
             _ => {}
         }
-        if let Some((score, header)) = beginning.above_numbers()
-            && better(&fallback, score, header.names.len())
-        {
-            fallback = Some((score, header.names.len(), header));
+        if let Some((score, header)) = beginning.above_numbers() {
+            keep_better(&mut fallback, score, header);
         }
     }
     let is_best = best.is_some();
     if let (false, Some(problem)) = (is_best, first_problem) {
         return Err(problem);
     }
-    let (_, _, mut header) = best.or(fallback).ok_or((None, Problem::Empty))?;
+    let (_, mut header) = best.or(fallback).ok_or((None, Problem::Empty))?;
     let is_usual = header.separator == Separator::default() && format.separator.is_none();
     header.is_separator_usual = is_usual || content.separator().is_some() || above.is_some();
     if header.line == 0 {
         return Err((Some(header.lines_above + 1), Problem::OnlyNumbers));
     }
     Ok(header)
+}
+
+/// How well a separator makes a table of a text: by the number of rows; then rather between several columns, and
+/// by a character than by blanks; then by the number of columns.
+type Fit = (usize, u8, usize);
+
+/// Keeps a header if it fits better.
+fn keep_better(best: &mut Option<(Fit, Header)>, rows: usize, header: Header) {
+    let width = header.names.len();
+    // A unit is no column of its own.
+    let is_torn = header.names.iter().any(|name| units::of_text(name).is_some());
+    let rank = match header.separator.character() {
+        _ if width == 1 || is_torn => 0,
+        None => 1,
+        Some(_) => 2,
+    };
+    let fit = (rows, rank, width);
+    if best.as_ref().is_none_or(|(other, _)| fit > *other) {
+        *best = Some((fit, header));
+    }
 }
 
 /// Returns the separator that the first line names.
@@ -326,11 +334,12 @@ impl<'a> Beginning<'a> {
 
     /// Returns the fields of the records below a header that may be rows: not comments, rules, or units.
     fn below(&self, at: usize, names: &[String]) -> impl Iterator<Item = Vec<String>> {
-        let count = names.len();
+        let (count, places) = (names.len(), velocity_places(names));
         let below = self.records[at + 1..].iter().enumerate();
         below
-            .filter(|(behind, (record, fields))| {
-                let is_between = *behind < BETWEEN_MAX && (is_rule(fields) || are_units(fields));
+            .filter(move |(behind, (record, fields))| {
+                let is_between =
+                    *behind < BETWEEN_MAX && (is_rule(fields) || are_units(fields, &places));
                 !is_between && !record.is_comment()
             })
             .map(move |(_, (_, fields))| trimmed(fields.clone(), count))

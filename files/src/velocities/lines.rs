@@ -50,7 +50,7 @@ impl<'a> Lines<'a> {
         if fields.iter().all(String::is_empty) && fields.len() > 1 || is_rule(&fields) {
             return Line::Rule;
         }
-        if self.is_first && are_units(&fields) && self.header.line > 0 {
+        if self.is_first && are_units(&fields, self.place.as_slice()) && self.header.line > 0 {
             self.is_first = false;
             return Line::Units(fields.iter().map(|field| units::of_velocity(field)).collect());
         }

@@ -67,6 +67,8 @@ struct Rows {
     /// By how much these may have been rounded.
     rounding: f64,
     suspects: Vec<Suspect>,
+    /// Number of all rows, also of those without a velocity.
+    count: usize,
     /// Number of rows with a cell before the velocity.
     filled: usize,
 }
@@ -86,7 +88,10 @@ impl Rows {
         while let Some(line) = lines.next() {
             let is_apart = lines.is_after_gap;
             let (line, label, fields) = match line? {
-                (line, Line::Data(fields)) => (line, waiting.take(), fields),
+                (line, Line::Data(fields)) => {
+                    rows.count += 1;
+                    (line, waiting.take(), fields)
+                }
                 (line, Line::Labelled { label, fields }) => (line, Some(label), fields),
                 (_, Line::OtherShape(_)) => {
                     other_shapes += 1;
@@ -195,7 +200,9 @@ impl Rows {
         let value = value.velocity(choice.unit);
         let is = |statistic: Statistic| {
             let value = if statistic == Statistic::Count { in_cell } else { value };
-            sets.iter().flatten().any(|set| set.is(statistic, value, rounding))
+            let is_of_set = |set: &Statistics| set.is(statistic, value, rounding);
+            sets.iter().flatten().any(is_of_set)
+                || statistic == Statistic::Count && in_cell == self.count as f64
         };
         match &one.label {
             Some(label) => is(label.statistic),

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use super::choice::Choice;
+use super::choice::{Choice, POSSIBLE};
 use super::content::{self, Content};
 use super::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
 use super::encodings::normalised;
 use super::header::Header;
 use super::lines::{Line, Lines};
+use super::number::Number;
 use super::problem::{COLUMN, LocatedProblem, Problem, listed, shortened};
 use super::summaries::{self, Summaries};
 
@@ -141,13 +142,16 @@ impl Table {
         above.next().is_some() || header.is_some_and(|line| line.trim_start().starts_with('#'))
     }
 
-    /// Returns whether a line of another shape than the rows is none of them: it is shorter, and begins with a
-    /// text that its column has not in other rows.
+    /// Returns whether a line of another shape than the rows is none of them: it begins with a word, and no number
+    /// in it can be a velocity.
     pub(super) fn is_below(&self, fields: &[String]) -> bool {
-        fields.len() < self.header.names.len()
-            && fields.iter().find(|field| !field.is_empty()).is_some_and(|first| {
-                !first.starts_with('"') && first.starts_with(|c: char| !c.is_ascii_digit())
-            })
+        let is_possible = |field: &String| {
+            Number::read(field, self.decimal())
+                .is_some_and(|number| POSSIBLE.contains(&number.velocity(self.unit())))
+        };
+        let first = fields.iter().find(|field| !field.is_empty());
+        first.is_some_and(|first| first.starts_with(char::is_alphabetic))
+            && !fields.iter().any(is_possible)
     }
 
     /// Returns the keys of `[data]` that say how the file is written, with their values as in a job file.
