@@ -48,7 +48,7 @@ pub struct FirstJob {
 /// If the file cannot be read, or has no column that may be one of velocities, or more than one.
 pub fn of_csv(path: &Path, name: &str) -> Result<FirstJob, InitError> {
     let refused = |problems| InitError { problems };
-    let table = velocities::understand(path).map_err(|problem| refused(vec![problem]))?;
+    let table = velocities::understand(path).map_err(refused)?;
     let roles = Roles::of(&table);
     let measured = velocities::of_table(path, &table, &roles.named()).map_err(refused)?;
     let mut understood = vec![table.described()];

@@ -90,9 +90,9 @@ impl CsvError {
 ///
 /// # Errors
 /// If it is none, or can be read in several ways.
-pub(crate) fn understand(path: &Path) -> Result<Table, CsvError> {
+pub(crate) fn understand(path: &Path) -> Result<Table, Vec<CsvError>> {
     let format = CsvFormat { is_found_out: true, ..CsvFormat::default() };
-    Table::open(path, &format).map_err(|problem| CsvError::located(path, problem))
+    Table::open(path, &format).map_err(|problem| vec![CsvError::located(path, problem)])
 }
 
 /// Returns the velocities of the file at `path`, m/s, in the file's order: in groups by the names

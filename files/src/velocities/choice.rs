@@ -147,6 +147,8 @@ struct Cells {
     filled: usize,
     /// The unit that stands below the header.
     unit_below: Option<VelocityUnit>,
+    /// Line and number of fields of the first row of another shape.
+    other_shape: Option<(usize, usize)>,
 }
 
 impl Cells {
@@ -157,6 +159,9 @@ impl Cells {
                 (_, Line::Units(units)) => cells.unit_below = units.get(place).copied().flatten(),
                 (line, Line::Data(mut fields)) if place < fields.len() => {
                     cells.add(line, fields.swap_remove(place));
+                }
+                (line, Line::OtherShape(fields)) => {
+                    cells.other_shape.get_or_insert((line, fields.len()));
                 }
                 _ => {}
             }
@@ -201,7 +206,7 @@ impl Cells {
             return Err(at_header(Problem::OtherUnit { column: column() }));
         }
         if self.values.is_empty() || 2 * self.values.len() < self.filled {
-            return Err(self.no_numbers(column()));
+            return Err(self.no_numbers(column(), header));
         }
         let unit = format.unit.or(says.velocity_unit()).or(self.unit_below);
         let unit = unit.or(self.unit_in_cells.filter(|_| !self.has_other_unit));
@@ -228,14 +233,17 @@ impl Cells {
     }
 
     /// Quotes the first cell that is no number.
-    fn no_numbers(&self, column: String) -> LocatedProblem {
+    fn no_numbers(&self, column: String, header: &Header) -> LocatedProblem {
         let mut texts: Vec<_> = self.texts.iter().filter(|(text, _)| !text.is_empty()).collect();
         texts.sort_by_key(|(_, line)| **line);
-        match texts.first() {
-            Some((found, line)) => {
+        match (texts.first(), self.other_shape) {
+            (Some((found, line)), _) => {
                 (Some(**line), Problem::NotNumbers { column, found: shortened(found) })
             }
-            None => (None, Problem::NoRowsBelow),
+            (None, Some((line, found))) => {
+                (Some(line), Problem::FieldCount { found, expected: header.names.len() })
+            }
+            (None, None) => (None, Problem::NoRowsBelow),
         }
     }
 

@@ -7,7 +7,7 @@ use super::names::ColumnName;
 use super::number::Number;
 use super::problem::{LocatedProblem, Problem};
 use super::text_lines::{Record, Records};
-use super::units;
+use super::units::{self, Unit};
 
 /// Number of records in which the header is looked for.
 const RECORDS_MAX: usize = 1000;
@@ -231,7 +231,7 @@ type Fit = (usize, u8, usize);
 fn keep_better(best: &mut Option<(Fit, Header)>, rows: usize, header: Header) {
     let width = header.names.len();
     // A unit is no column of its own.
-    let is_torn = header.names.iter().any(|name| units::of_text(name).is_some());
+    let is_torn = header.names.iter().any(|name| is_velocity_unit(name));
     let rank = match header.separator.character() {
         _ if width == 1 || is_torn => 0,
         None => 1,
@@ -378,9 +378,17 @@ impl<'a> Beginning<'a> {
         };
         let width = self.records[first].1.len();
         let rows = self.records[first..].iter().filter(|(_, fields)| fields.len() == width).count();
-        let above = self.records[..first].iter().rposition(|(record, _)| {
-            names_in(record.text, self.separator).is_ok_and(|names| names.len() == width)
-        });
+        let names_of =
+            |record: &Record<'_>| names_in(record.text, self.separator).unwrap_or_default();
+        let above = self.records[..first]
+            .iter()
+            .rposition(|(record, _)| names_of(record).len() == width)
+            // The rows may all have another number of fields.
+            .or_else(|| {
+                let last = first.checked_sub(1)?;
+                let names = names_of(&self.records[last].0);
+                (!velocity_places(&names).is_empty()).then_some(last)
+            });
         let Some(above) = above else {
             let mut none = self.header_at(first, Vec::new());
             (none.lines_above, none.line) = (none.line - 1, 0);
@@ -400,7 +408,11 @@ fn is_gap(cell: &str) -> bool {
 /// Returns the places of names that are of velocities, and not only a unit.
 pub(super) fn velocity_places(names: &[String]) -> Vec<usize> {
     let is_one =
-        |name: &&String| units::of_text(name).is_none() && ColumnName::of(name).is_of_velocities();
+        |name: &&String| !is_velocity_unit(name) && ColumnName::of(name).is_of_velocities();
     let places = names.iter().enumerate().filter(|(_, name)| is_one(name));
     places.map(|(place, _)| place).collect()
+}
+
+fn is_velocity_unit(name: &str) -> bool {
+    matches!(units::of_text(name), Some(Unit::Velocity(_) | Unit::OtherVelocity))
 }

@@ -80,7 +80,7 @@ impl Rows {
         choice: &Choice,
         are_bare_noticed: bool,
     ) -> Result<Self, LocatedProblem> {
-        let mut rows = Self::default();
+        let mut rows = Self { rounding: f64::INFINITY, ..Self::default() };
         let mut lines = Lines::of(text, header, Some(choice.place));
         // A label may stand on a line of its own, above its value.
         let mut waiting: Option<Label> = None;
@@ -138,7 +138,8 @@ impl Rows {
 
     fn add(&mut self, value: &Number, choice: &Choice) {
         self.velocities.push(value.velocity(choice.unit));
-        self.rounding = self.rounding.max(value.rounding(choice.unit));
+        // Zeros at the end may have been left away.
+        self.rounding = self.rounding.min(value.rounding(choice.unit));
     }
 
     /// Decides of each block of such rows with no other between them.

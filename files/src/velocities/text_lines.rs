@@ -147,7 +147,7 @@ mod tests {
     fn a_line_that_is_too_long_or_no_text_ends_the_records() {
         let long = "x".repeat(limits::LINE_BYTES_MAX + 1);
         assert_eq!(records(&format!("a\n{long}\nb\n")), [(1, "a"), (0, "")]);
-        assert_eq!(records("a\n1\0002\nb\n"), [(1, "a"), (0, "")]);
+        assert_eq!(records("a\n1\u{0}2\nb\n"), [(1, "a"), (0, "")]);
     }
 
     #[test]
