@@ -37,12 +37,14 @@ pub(super) const KEYS: [Key; 20] = [
     },
     Key {
         name: "separator",
-        meaning: "what separates the fields of the file: `\",\"` (default) or `\";\"` or `\"tab\"` or `\"|\"`; \
-                  without the key, a first line such as `sep=;` is obeyed",
+        meaning: "what separates the fields of the file: `\",\"` (default) or `\";\"` or `\"tab\"` or `\"|\"` or \
+                  `\"space\"` (one or more blanks) or `\"spaces\"` (two or more); without the key, a first line \
+                  such as `sep=;` is obeyed",
     },
     Key {
         name: "decimal",
-        meaning: "the decimal mark of the file's numbers: `\".\"` (default) or `\",\"`",
+        meaning: "the decimal mark of the file's numbers: `\".\"` (default) or `\",\"`; marks of thousands are \
+                  read where they are unambiguous",
     },
     Key {
         name: "missing",
