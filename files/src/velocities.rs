@@ -33,7 +33,6 @@ use std::path::{Path, PathBuf};
 
 use osteon_common::check::VELOCITIES_MIN;
 use osteon_common::job::Group;
-use osteon_common::origin::Origin;
 use osteon_common::visible;
 use thiserror::Error;
 
@@ -42,7 +41,7 @@ use self::columns::Columns;
 use self::lines::{Line, Lines};
 use self::problem::{LocatedProblem, Problem, shortened};
 
-pub(crate) use self::account::Account;
+pub(crate) use self::collected::Measured;
 pub(crate) use self::columns::{NamedColumns, is_like_subject};
 pub(crate) use self::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
 pub(crate) use self::table::Table;
@@ -52,17 +51,6 @@ const REPORTED_MAX: usize = 10;
 
 /// Most lines below a table that are none of its rows.
 const BELOW_MAX: usize = 1000;
-
-/// Measured velocities of a file, one set or a set for each group.
-#[derive(Debug)]
-pub(crate) struct Measured<T> {
-    /// The velocities, m/s.
-    pub(crate) data: T,
-    /// Their positions in the file.
-    pub(crate) origin: Origin,
-    /// What was taken and what was not.
-    pub(crate) account: Account,
-}
 
 /// One error in a file of velocities.
 #[derive(Debug, Error)]

@@ -9,7 +9,6 @@ use osteon_common::limits;
 use osteon_common::origin::Origin;
 use osteon_common::parameters::Parameter;
 
-use super::Measured;
 use super::account::Account;
 use super::columns::{Columns, Row};
 use super::problem::{Problem, shortened};
@@ -17,6 +16,17 @@ use super::table::Table;
 
 /// A column that seems to name subjects is an index of the rows if it has more names than this.
 const UNUSED_NAMES_MAX: usize = 10_000;
+
+/// Measured velocities of a file, one set or a set for each group.
+#[derive(Debug)]
+pub(crate) struct Measured<T> {
+    /// The velocities, m/s.
+    pub(crate) data: T,
+    /// Their positions in the file.
+    pub(crate) origin: Origin,
+    /// What was taken and what was not.
+    pub(crate) account: Account,
+}
 
 /// The velocities read so far.
 pub(super) struct CollectedVelocities {
