@@ -1,7 +1,7 @@
 //! Measured velocities from a file.
 //!
 //! There is one reader, for `osteon init` and for jobs, in steps: the bytes and what kind of file they are
-//! ([`content`]), their text ([`encodings`]), its lines ([`text_lines`]), where the table begins and what
+//! ([`opening`]), their text ([`encodings`]), its lines ([`text_lines`]), where the table begins and what
 //! separates its fields ([`header`]), which column has the velocities and how they are written ([`choice`]),
 //! which rows are none ([`lines`], [`summaries`]), the rows themselves ([`columns`]), and what was taken
 //! ([`account`]). What no key says is found out for `osteon init`; for a job it is as documented.
@@ -21,6 +21,7 @@ mod lines;
 mod matlab;
 mod names;
 mod number;
+mod opening;
 mod problem;
 mod statistics;
 mod summaries;

@@ -148,144 +148,189 @@ fn quoted(text: &str, separator: &str) -> String {
     }
 }
 
-fn table(seed: u64) -> Table {
-    let random = &mut Random(seed);
-    let language = random.of(&LANGUAGES);
-    let separator = random.of(&[",", ",", ";", ";", "\t", "\t", "|", " ", "   "]);
-    let is_blank = separator.trim().is_empty() && separator != "\t";
-    let decimal =
-        if separator == ";" { random.of(&['.', ',']) } else { random.of(&['.', '.', '.', ',']) };
-    let is_kilometres = random.one_in(4);
-    let thousands = match (is_kilometres || is_blank, random.below(5)) {
-        (true, _) => None,
-        (_, 0) => Some(if decimal == '.' { ',' } else { '.' }),
-        (_, 1) => Some(random.of(&['\'', '\u{a0}', '\u{202f}'])),
-        _ => None,
-    };
-    let behind = if is_blank { "" } else { random.of(&["", "", "", "", " ± 12", " m/s"]) };
-    let behind = if is_kilometres && behind == " m/s" { " km/s" } else { behind };
-    let behind = if is_kilometres && behind == " ± 12" { "" } else { behind };
-    let writing =
-        Writing { decimal, decimals: 1 + random.below(2), thousands, behind, is_kilometres };
-    let unit = match (is_kilometres, random.below(4)) {
-        (false, 0) => "m/s",
-        (false, 1) => "m s-1",
-        (true, 0) => "km/s",
-        (true, 1) => "mm/µs",
-        _ => "",
-    };
-    let has_unit_row = !unit.is_empty() && random.one_in(4) && !is_blank;
-    let in_header = !unit.is_empty() && !has_unit_row;
-    let join = if is_blank { "_" } else { " " };
-    let name = language.name.replace(' ', join);
-    let unit_in_name = unit.replace(' ', "").replace("ms-1", "m/s");
-    let name =
-        if in_header { format!("{name}{}({unit_in_name})", join.replace('_', "")) } else { name };
-    // The other columns stand before and behind.
-    let before = random.of(&[&["id"][..], &["nr", "patient"], &["Date", "Time"], &["specimen"]]);
-    let behind_names = random.of(&[&[][..], &["T_(°C)"], &["tof_us", "thickness_mm"], &["note"]]);
-    let behind_names = if language.encoding.is_some() && behind_names == ["T_(°C)"] {
-        &[][..]
-    } else {
-        behind_names
-    };
-    let has_trailing = !is_blank && random.one_in(6);
-    let mut text = String::new();
-    for line in random.of(&PREAMBLES) {
-        writeln!(text, "{}", line.replace("{s}", separator)).unwrap();
+/// How a table is written.
+struct Design {
+    language: Language,
+    separator: &'static str,
+    is_blank: bool,
+    has_trailing: bool,
+    writing: Writing,
+    unit: &'static str,
+    has_unit_row: bool,
+    /// Names of the other columns, before and behind that of the velocities.
+    others: [&'static [&'static str]; 2],
+}
+
+impl Design {
+    fn of(random: &mut Random) -> Self {
+        let language = random.of(&LANGUAGES);
+        let separator = random.of(&[",", ",", ";", ";", "\t", "\t", "|", " ", "   "]);
+        let is_blank = separator.trim().is_empty() && separator != "\t";
+        let marks = if separator == ";" { ['.', ',', '.', ','] } else { ['.', '.', '.', ','] };
+        let decimal = random.of(&marks);
+        let is_kilometres = random.one_in(4);
+        let thousands = match (is_kilometres || is_blank, random.below(5)) {
+            (true, _) => None,
+            (_, 0) => Some(if decimal == '.' { ',' } else { '.' }),
+            (_, 1) => Some(random.of(&['\'', '\u{a0}', '\u{202f}'])),
+            _ => None,
+        };
+        let behind = match (is_blank, is_kilometres, random.below(6)) {
+            (false, false, 0) => " \u{b1} 12",
+            (false, false, 1) => " m/s",
+            (false, true, 1) => " km/s",
+            _ => "",
+        };
+        let decimals = 1 + random.below(2);
+        let writing = Writing { decimal, decimals, thousands, behind, is_kilometres };
+        let unit = match (is_kilometres, random.below(4)) {
+            (false, 0) => "m/s",
+            (false, 1) => "m s-1",
+            (true, 0) => "km/s",
+            (true, 1) => "mm/\u{b5}s",
+            _ => "",
+        };
+        let has_unit_row = !unit.is_empty() && random.one_in(4) && !is_blank;
+        let before =
+            random.of(&[&["id"][..], &["nr", "patient"], &["Date", "Time"], &["specimen"]]);
+        let behind = match (language.encoding, random.below(4)) {
+            (None, 0) => &["T_(\u{b0}C)"][..],
+            (_, 1) => &["tof_us", "thickness_mm"],
+            (_, 2) => &["note"],
+            _ => &[],
+        };
+        let has_trailing = !is_blank && random.one_in(6);
+        let others = [before, behind];
+        Self { language, separator, is_blank, has_trailing, writing, unit, has_unit_row, others }
     }
-    let mut write_row = |cells: &[String]| {
-        let cells: Vec<String> = cells.iter().map(|cell| quoted(cell, separator)).collect();
-        let end = if has_trailing { separator } else { "" };
-        writeln!(text, "{}{end}", cells.join(separator)).unwrap();
-    };
-    let row = |first: Vec<String>, velocity: String, last: Vec<String>| {
-        [first, vec![velocity], last].concat()
-    };
-    let names = |list: &[&str]| list.iter().map(|&one| one.to_owned()).collect::<Vec<_>>();
-    write_row(&row(names(before), name, names(behind_names)));
-    if has_unit_row {
-        let none = |list: &[&str]| vec!["-".to_owned(); list.len()];
-        write_row(&row(none(before), format!("[{unit}]"), none(behind_names)));
+
+    fn write_row(&self, text: &mut String, first: &[String], velocity: &str, last: &[String]) {
+        let cells = first.iter().map(String::as_str).chain([velocity]);
+        let cells = cells.chain(last.iter().map(String::as_str));
+        let cells: Vec<String> = cells.map(|cell| quoted(cell, self.separator)).collect();
+        let end = if self.has_trailing { self.separator } else { "" };
+        writeln!(text, "{}{end}", cells.join(self.separator)).unwrap();
     }
-    let count = 12 + random.below(40);
-    let mut velocities = Vec::new();
-    let small = |value: f64| format!("{value:.2}").replace('.', &decimal.to_string());
-    let others = |place: usize, random: &mut Random| {
-        let first = before.iter().map(|name| match *name {
+
+    /// Writes the names, and the line of units.
+    fn write_header(&self, text: &mut String) {
+        let (join, blank) = if self.is_blank { ("_", "") } else { (" ", " ") };
+        let name = self.language.name.replace(' ', join);
+        let unit = self.unit.replace("m s-1", "m/s");
+        let name = match unit.is_empty() || self.has_unit_row {
+            true => name,
+            false => format!("{name}{blank}({unit})"),
+        };
+        let [before, behind] =
+            self.others.map(|list| list.iter().map(|&one| one.to_owned()).collect::<Vec<_>>());
+        self.write_row(text, &before, &name, &behind);
+        if self.has_unit_row {
+            let [before, behind] = self.others.map(|list| vec!["-".to_owned(); list.len()]);
+            self.write_row(text, &before, &format!("[{}]", self.unit), &behind);
+        }
+    }
+
+    /// The cell of another column in a row.
+    fn other(&self, name: &str, place: usize, random: &mut Random) -> String {
+        let small =
+            |value: f64| format!("{value:.2}").replace('.', &self.writing.decimal.to_string());
+        match name {
             "id" | "nr" => (place + 1).to_string(),
             "patient" => format!("P{}", place % 3),
             "Date" => format!("2026-03-{:02}", place % 28 + 1),
             "Time" => format!("10:{:02}:00", place % 60),
-            _ => format!("S{place}"),
-        });
-        let last = behind_names.iter().map(|name| match *name {
+            "specimen" => format!("S{place}"),
+            "note" => "ok".to_owned(),
             "tof_us" => small(5.0 + random.below(100) as f64 / 100.0),
             "thickness_mm" => small(3.0 + random.below(200) as f64 / 100.0),
-            "note" => "ok".to_owned(),
             _ => small(20.0 + random.below(50) as f64 / 10.0),
-        });
-        (first.collect::<Vec<_>>(), last.collect::<Vec<_>>())
-    };
-    let gap = random.of(&["NA", "-", "n.d.", "NaN"]);
-    let has_gaps = random.one_in(4);
-    for place in 0..count {
-        let (first, last) = others(place, random);
-        let cell = match has_gaps && random.one_in(10) {
-            true => gap.to_owned(),
-            false => {
-                let (cell, rounded) = writing.written(random.velocity());
+        }
+    }
+
+    /// Writes rows; returns the velocities in them.
+    fn write_rows(&self, text: &mut String, count: usize, random: &mut Random) -> Vec<f64> {
+        let mut velocities = Vec::new();
+        let gap = random.of(&["NA", "-", "n.d.", "NaN"]);
+        let has_gaps = random.one_in(4);
+        for place in 0..count {
+            let [first, last] = self.others.map(|list| {
+                list.iter().map(|name| self.other(name, place, random)).collect::<Vec<_>>()
+            });
+            let (cell, rounded) = self.writing.written(random.velocity());
+            if has_gaps && random.one_in(10) {
+                self.write_row(text, &first, gap, &last);
+            } else {
                 velocities.push(rounded);
-                cell
+                self.write_row(text, &first, &cell, &last);
             }
-        };
-        write_row(&row(first, cell, last));
+        }
+        velocities
     }
-    let mut is_ambiguous = "";
-    if language.name == "SV" && is_kilometres && unit.is_empty() && behind.is_empty() {
-        is_ambiguous = "a symbol that may mean something else, with numbers of another size";
-    }
-    if random.one_in(3) {
+
+    /// Writes rows that sum up the others.
+    fn write_summaries(&self, text: &mut String, velocities: &[f64], random: &mut Random) {
         let mean = velocities.iter().sum::<f64>() / velocities.len() as f64;
         let squares: f64 = velocities.iter().map(|one| (one - mean) * (one - mean)).sum();
         let deviation = (squares / (velocities.len() - 1) as f64).sqrt();
-        let plain = Writing { behind: "", ..writing };
-        let shown =
-            [plain.written(mean).0, plain.written(deviation).0, velocities.len().to_string()];
-        let labels = language.mean.iter().zip(shown).take(1 + random.below(3));
-        for (label, value) in labels {
-            let label = if is_blank { label.replace(' ', "_") } else { (*label).to_owned() };
-            let empty = |count: usize| vec![if is_blank { "-" } else { "" }.to_owned(); count];
-            let mut first = empty(before.len());
+        let plain = Writing { behind: "", ..self.writing };
+        let count = velocities.len().to_string();
+        let shown = [plain.written(mean).0, plain.written(deviation).0, count];
+        for (label, value) in self.language.mean.iter().zip(shown).take(1 + random.below(3)) {
+            let label = if self.is_blank { label.replace(' ', "_") } else { (*label).to_owned() };
+            let empty = if self.is_blank { "-" } else { "" };
+            let [mut first, last] = self.others.map(|list| vec![empty.to_owned(); list.len()]);
             first[0] = label;
-            write_row(&row(first, value, empty(behind_names.len())));
+            self.write_row(text, &first, &value, &last);
         }
-        if random.one_in(5) {
-            // A mean of others: nobody can know.
-            let mut first = vec![String::from("-"); before.len()];
-            first[0] = "Mean".to_owned();
-            let last = vec!["-".to_owned(); behind_names.len()];
-            write_row(&row(first, plain.written(mean + 25.0).0, last));
-            is_ambiguous = "a mean of other rows";
+    }
+
+    fn bytes(&self, text: &str, random: &mut Random) -> Vec<u8> {
+        let old = self.language.encoding.map(|encoding| encoding.encode(text));
+        match (random.below(4), old) {
+            (0, _) => [b"\xef\xbb\xbf", text.as_bytes()].concat(),
+            (1, _) => [vec![0xff, 0xfe], text.encode_utf16().flat_map(u16::to_le_bytes).collect()]
+                .concat(),
+            (2, Some((bytes, _, false))) => bytes.into_owned(),
+            _ => text.as_bytes().to_vec(),
         }
+    }
+
+    /// Why the table may be refused.
+    fn ambiguity(&self) -> &'static str {
+        let Writing { is_kilometres, behind, .. } = self.writing;
+        match self.language.name == "SV"
+            && is_kilometres
+            && self.unit.is_empty()
+            && behind.is_empty()
+        {
+            true => "a symbol that may mean something else, with numbers of another size",
+            false => "",
+        }
+    }
+}
+
+fn table(seed: u64) -> Table {
+    let random = &mut Random(seed);
+    let design = Design::of(random);
+    let mut text = String::new();
+    for line in random.of(&PREAMBLES) {
+        writeln!(text, "{}", line.replace("{s}", design.separator)).unwrap();
+    }
+    design.write_header(&mut text);
+    let count = 12 + random.below(40);
+    let velocities = design.write_rows(&mut text, count, random);
+    if random.one_in(3) {
+        design.write_summaries(&mut text, &velocities, random);
     }
     match random.below(8) {
         0 => text += "\nRemarks: none, or few\nchecked by A\n",
-        1 if is_blank => text += "\nEnd\n",
-        1 => writeln!(text, "\nNumber of measurements:{separator}{count}").unwrap(),
+        1 if design.is_blank => text += "\nEnd\n",
+        1 => writeln!(text, "\nNumber of measurements:{}{count}", design.separator).unwrap(),
         _ => {}
     }
-    let end = random.of(&["\n", "\r\n", "\r"]);
-    let text = text.replace('\n', end);
-    let bytes = match random.below(4) {
-        0 => [b"\xef\xbb\xbf", text.as_bytes()].concat(),
-        1 => [vec![0xff, 0xfe], text.encode_utf16().flat_map(u16::to_le_bytes).collect()].concat(),
-        2 if language.encoding.is_some_and(|encoding| !encoding.encode(&text).2) => {
-            language.encoding.unwrap().encode(&text).0.into_owned()
-        }
-        _ => text.as_bytes().to_vec(),
-    };
-    Table { bytes, velocities, is_ambiguous, text }
+    let text = text.replace('\n', random.of(&["\n", "\r\n", "\r"]));
+    let bytes = design.bytes(&text, random);
+    Table { bytes, velocities, is_ambiguous: design.ambiguity(), text }
 }
 
 /// The velocities that a job has which `init` wrote, in the order of the file; or the refusal.

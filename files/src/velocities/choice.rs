@@ -36,7 +36,7 @@ const NINES_ABOVE: f64 = 1.5;
 
 /// How the column of velocities is read.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Choice {
+pub(super) struct ColumnChoice {
     pub(super) place: usize,
     pub(super) decimal: DecimalMark,
     pub(super) unit: VelocityUnit,
@@ -46,7 +46,7 @@ pub(super) struct Choice {
     pub(super) missing: Vec<String>,
 }
 
-impl Choice {
+impl ColumnChoice {
     /// Returns the column that the keys name, read as they say.
     pub(super) fn given(format: &CsvFormat, place: usize) -> Self {
         Self {
@@ -114,7 +114,7 @@ fn places_with_units(text: &str, header: &Header) -> Vec<usize> {
 }
 
 /// Returns the one of several columns whose name is that of the documentation.
-fn only_one(choices: Vec<Choice>, header: &Header) -> Result<Choice, Problem> {
+fn only_one(choices: Vec<ColumnChoice>, header: &Header) -> Result<ColumnChoice, Problem> {
     let names: Vec<String> =
         choices.iter().map(|choice| header.names[choice.place].clone()).collect();
     let mut exact = choices.into_iter().filter(|one| header.names[one.place] == "velocity");
@@ -197,7 +197,7 @@ impl Cells {
         self.values.push(values);
     }
 
-    fn choice(&self, header: &Header, format: &CsvFormat) -> Result<Choice, LocatedProblem> {
+    fn choice(&self, header: &Header, format: &CsvFormat) -> Result<ColumnChoice, LocatedProblem> {
         let name = &header.names[self.place];
         let says = ColumnName::of(name);
         let column = || shortened(name);
@@ -222,7 +222,7 @@ impl Cells {
             if let Some((unit, is_unit_guessed)) = found {
                 let missing = self.missing(mark, format, &column())?;
                 let place = self.place;
-                return Ok(Choice { place, decimal: mark, unit, is_unit_guessed, missing });
+                return Ok(ColumnChoice { place, decimal: mark, unit, is_unit_guessed, missing });
             }
         }
         let median = medians.first().copied().unwrap_or(f64::NAN);

@@ -3,7 +3,7 @@
 use osteon_common::check::{DECAY, VELOCITY};
 use osteon_common::parameters::Parameter;
 
-use super::choice::Choice;
+use super::choice::ColumnChoice;
 use super::encodings::normalised;
 use super::number::Number;
 use super::problem::{Problem, shortened};
@@ -28,7 +28,7 @@ pub(crate) struct NamedColumns<'a> {
 
 /// Positions of velocity, group, subject and known quantities in each row.
 pub(super) struct Columns<'a> {
-    choice: &'a Choice,
+    choice: &'a ColumnChoice,
     velocity: NamedColumn,
     group: Vec<NamedColumn>,
     subject: Option<NamedColumn>,

@@ -123,16 +123,23 @@ fn detected(bytes: &[u8]) -> Result<Option<&'static Encoding>, Problem> {
     };
     // A word of velocities beyond ASCII can be read in one encoding only.
     let by_word = LEGACY.iter().find(reads).copied();
-    let by_word = by_word.or_else(|| has_only_signs(bytes).then_some(WINDOWS_1252));
+    let by_word = by_word.or_else(|| is_western(bytes).then_some(WINDOWS_1252));
     by_word.or_else(|| guessed(bytes)).map(Some).ok_or(Problem::UnknownEncoding)
 }
 
-/// Returns whether the only bytes beyond ASCII are signs of measurement by themselves: ± ° µ · and the blank that does
-/// not break, which most encodings of one byte have in common.
-fn has_only_signs(bytes: &[u8]) -> bool {
+/// Returns whether each byte beyond ASCII stands by itself, and is a sign of measurement (± ° µ · and the blank that does
+/// not break) or, beside a letter of ASCII, an accented one: the text of a Western European language.
+fn is_western(bytes: &[u8]) -> bool {
     let is_sign = |byte: u8| matches!(byte, 0xa0 | 0xb0 | 0xb1 | 0xb5 | 0xb7);
-    let is_alone = bytes.windows(2).all(|pair| pair[0].is_ascii() || pair[1].is_ascii());
-    is_alone && bytes.iter().all(|&byte| byte.is_ascii() || is_sign(byte))
+    let is_accented = |byte: u8| byte >= 0xc0 && !matches!(byte, 0xd7 | 0xf7);
+    let at =
+        |place: Option<usize>| place.and_then(|place| bytes.get(place)).copied().unwrap_or(b' ');
+    bytes.iter().enumerate().filter(|(_, byte)| !byte.is_ascii()).all(|(place, &byte)| {
+        let (before, behind) = (at(place.checked_sub(1)), at(Some(place + 1)));
+        let is_in_word = before.is_ascii_alphabetic() || behind.is_ascii_alphabetic();
+        let is_alone = before.is_ascii() && behind.is_ascii();
+        is_alone && (is_sign(byte) || is_accented(byte) && is_in_word)
+    })
 }
 
 /// Returns whether a text names velocities by a word beyond ASCII.

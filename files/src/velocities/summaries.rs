@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use osteon_common::limits;
 
-use super::choice::{Choice, POSSIBLE};
+use super::choice::{ColumnChoice, POSSIBLE};
 use super::header::Header;
 use super::lines::{Line, Lines};
 use super::number::Number;
@@ -49,7 +49,7 @@ struct Suspect {
 pub(super) fn of_table(
     text: &str,
     header: &Header,
-    choice: &Choice,
+    choice: &ColumnChoice,
 ) -> Result<Summaries, LocatedProblem> {
     let mut rows = Rows::of(text, header, choice, true)?;
     if rows.suspects.iter().filter(|one| one.label.is_none()).count() > BARE_MAX {
@@ -77,7 +77,7 @@ impl Rows {
     fn of(
         text: &str,
         header: &Header,
-        choice: &Choice,
+        choice: &ColumnChoice,
         are_bare_noticed: bool,
     ) -> Result<Self, LocatedProblem> {
         let mut rows = Self { rounding: f64::INFINITY, ..Self::default() };
@@ -136,14 +136,14 @@ impl Rows {
         Ok(rows)
     }
 
-    fn add(&mut self, value: &Number, choice: &Choice) {
+    fn add(&mut self, value: &Number, choice: &ColumnChoice) {
         self.velocities.push(value.velocity(choice.unit));
         // Zeros at the end may have been left away.
         self.rounding = self.rounding.min(value.rounding(choice.unit));
     }
 
     /// Decides of each block of such rows with no other between them.
-    fn verdicts(&self, choice: &Choice) -> Result<Summaries, LocatedProblem> {
+    fn verdicts(&self, choice: &ColumnChoice) -> Result<Summaries, LocatedProblem> {
         let mut left_out = Summaries::new();
         let rows = self.velocities.len();
         let all = Statistics::of(&self.velocities);
@@ -194,7 +194,7 @@ impl Rows {
     }
 
     /// Returns whether the value is what the label says, of some of the rows.
-    fn is_found(&self, one: &Suspect, choice: &Choice, sets: &[Option<Statistics>]) -> bool {
+    fn is_found(&self, one: &Suspect, choice: &ColumnChoice, sets: &[Option<Statistics>]) -> bool {
         let Some(value) = &one.value else { return false };
         let rounding = value.rounding(choice.unit) + self.rounding;
         let in_cell = value.value();
@@ -212,7 +212,7 @@ impl Rows {
     }
 
     /// Returns whether a row has a number that may be a velocity.
-    fn is_possible(&self, one: &Suspect, choice: &Choice) -> bool {
+    fn is_possible(&self, one: &Suspect, choice: &ColumnChoice) -> bool {
         one.value.as_ref().is_some_and(|value| POSSIBLE.contains(&value.velocity(choice.unit)))
     }
 

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use super::choice::{Choice, POSSIBLE};
-use super::content::{self, Content};
+use super::choice::{ColumnChoice, POSSIBLE};
+use super::content::Content;
 use super::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
 use super::encodings::normalised;
 use super::header::Header;
 use super::lines::{Line, Lines};
 use super::number::Number;
+use super::opening;
 use super::problem::{COLUMN, LocatedProblem, Problem, listed, shortened};
 use super::summaries::{self, Summaries};
 
@@ -17,7 +18,7 @@ use super::summaries::{self, Summaries};
 pub(crate) struct Table {
     pub(super) content: Content,
     pub(super) header: Header,
-    pub(super) choice: Choice,
+    pub(super) choice: ColumnChoice,
     /// Rows that sum up others.
     pub(super) summaries: Summaries,
 }
@@ -33,7 +34,7 @@ impl Table {
                 .map(|texts| texts.into_iter().map(normalised).collect()),
             ..format.clone()
         };
-        let mut contents = content::of_file(path, format)?.into_iter();
+        let mut contents = opening::of_file(path, format)?.into_iter();
         let (Some(first), second) = (contents.next(), contents.next()) else {
             return Err((None, Problem::Empty));
         };
@@ -66,11 +67,11 @@ impl Table {
         let format = if content.separator().is_some() { &of_table } else { format };
         let header = Header::of(&content, format)?;
         let choice = match format.is_found_out {
-            true => Choice::found(&content.text, &header, format)?,
+            true => ColumnChoice::found(&content.text, &header, format)?,
             false => {
                 let at_header = |problem| (Some(header.line).filter(|&line| line > 0), problem);
                 let place = given_place(&header, format).map_err(at_header)?;
-                let choice = Choice::given(format, place);
+                let choice = ColumnChoice::given(format, place);
                 check_units(&content.text, &header, &choice)?;
                 choice
             }
@@ -236,7 +237,7 @@ pub(super) fn place_of(names: &[String], column: &str) -> Result<usize, Problem>
 }
 
 /// Refuses a unit below the header that is not that of the job.
-fn check_units(text: &str, header: &Header, choice: &Choice) -> Result<(), LocatedProblem> {
+fn check_units(text: &str, header: &Header, choice: &ColumnChoice) -> Result<(), LocatedProblem> {
     let Some(Ok((line, Line::Units(units)))) = Lines::of(text, header, Some(choice.place)).next()
     else {
         return Ok(());
