@@ -39,13 +39,13 @@ use thiserror::Error;
 
 use self::collected::CollectedVelocities;
 use self::columns::Columns;
-use self::lines::{Line, Lines};
+use self::lines::{TableLine, TableLines};
 use self::problem::{LocatedProblem, Problem, shortened};
 
 pub(crate) use self::collected::Measured;
 pub(crate) use self::columns::{NamedColumns, is_like_subject};
 pub(crate) use self::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
-pub(crate) use self::table::Table;
+pub(crate) use self::table::VelocityTable;
 
 /// Maximum number of bad lines that are reported individually.
 const REPORTED_MAX: usize = 10;
@@ -79,9 +79,9 @@ impl CsvError {
 ///
 /// # Errors
 /// If it is none, or can be read in several ways.
-pub(crate) fn understand(path: &Path) -> Result<Table, Vec<CsvError>> {
+pub(crate) fn understand(path: &Path) -> Result<VelocityTable, Vec<CsvError>> {
     let format = CsvFormat { is_found_out: true, ..CsvFormat::default() };
-    Table::open(path, &format).map_err(|problem| vec![CsvError::located(path, problem)])
+    VelocityTable::open(path, &format).map_err(|problem| vec![CsvError::located(path, problem)])
 }
 
 /// Returns the velocities of the file at `path`, m/s, in the file's order: in groups by the names
@@ -95,7 +95,7 @@ pub(crate) fn read(
     named: &NamedColumns<'_>,
     format: &CsvFormat,
 ) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
-    let table = Table::open(path, format).map_err(|problem| {
+    let table = VelocityTable::open(path, format).map_err(|problem| {
         vec![CsvError { cure: cure(path, format, &problem.1), ..CsvError::located(path, problem) }]
     })?;
     let header = table.header_line();
@@ -117,7 +117,7 @@ pub(crate) fn read(
 /// Those of the rows.
 pub(crate) fn of_table(
     path: &Path,
-    table: &Table,
+    table: &VelocityTable,
     named: &NamedColumns<'_>,
 ) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
     let located = |problem| CsvError::located(path, problem);
@@ -138,13 +138,14 @@ pub(crate) fn of_table(
 
 /// Gathers the velocities of the rows.
 fn gather(
-    table: &Table,
+    table: &VelocityTable,
     columns: &Columns<'_>,
     named: &NamedColumns<'_>,
 ) -> Result<CollectedVelocities, Vec<LocatedProblem>> {
     let gathered = CollectedVelocities::new(named.subject.is_some(), table);
-    let mut reading = Reading { table, columns, gathered, problems: Vec::new(), below: Vec::new() };
-    for line in Lines::of(&table.content.text, &table.header, Some(table.place())) {
+    let mut reading =
+        RowReading { table, columns, gathered, problems: Vec::new(), below: Vec::new() };
+    for line in TableLines::of(&table.content.text, &table.header, Some(table.place())) {
         let read =
             line.map_err(|(line, problem)| (line, problem, true)).and_then(|(number, line)| {
                 reading.line(number, line).map_err(|problem| {
@@ -169,8 +170,8 @@ fn gather(
 }
 
 /// The rows of a table while they are read.
-struct Reading<'a> {
-    table: &'a Table,
+struct RowReading<'a> {
+    table: &'a VelocityTable,
     columns: &'a Columns<'a>,
     gathered: CollectedVelocities,
     problems: Vec<LocatedProblem>,
@@ -178,21 +179,23 @@ struct Reading<'a> {
     below: Vec<(usize, Vec<String>)>,
 }
 
-impl Reading<'_> {
-    fn line(&mut self, number: usize, line: Line) -> Result<(), Problem> {
+impl RowReading<'_> {
+    fn line(&mut self, number: usize, line: TableLine) -> Result<(), Problem> {
         let account = &mut self.gathered.account;
         let fields = match line {
-            Line::Rule => return Ok(()),
-            Line::OpenQuote => return Err(Problem::Quote),
-            Line::Units(_) => {
+            TableLine::Rule => return Ok(()),
+            TableLine::OpenQuote => return Err(Problem::Quote),
+            TableLine::Units(_) => {
                 account.leave_out(number, "(units)");
                 return Ok(());
             }
-            Line::RepeatedHeader => {
+            TableLine::RepeatedHeader => {
                 account.leave_out(number, "(the header again)");
                 return Ok(());
             }
-            Line::OtherShape(fields) | Line::Labelled { fields, .. } | Line::Data(fields) => fields,
+            TableLine::OtherShape(fields)
+            | TableLine::Labelled { fields, .. }
+            | TableLine::Data(fields) => fields,
         };
         if let Some(shown) = self.table.summaries.get(&number) {
             account.leave_out(number, shown);
@@ -227,7 +230,7 @@ impl Reading<'_> {
     }
 }
 
-fn wrong_shape(table: &Table, fields: &[String]) -> Problem {
+fn wrong_shape(table: &VelocityTable, fields: &[String]) -> Problem {
     Problem::FieldCount { found: fields.len(), expected: table.names().len() }
 }
 
@@ -237,7 +240,7 @@ fn cure(path: &Path, format: &CsvFormat, problem: &Problem) -> String {
         return String::new();
     }
     let open = CsvFormat { is_found_out: true, ..format.clone() };
-    let Ok(table) = Table::open(path, &open) else { return String::new() };
+    let Ok(table) = VelocityTable::open(path, &open) else { return String::new() };
     let keys: Vec<String> = table
         .keys()
         .into_iter()

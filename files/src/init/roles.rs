@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use osteon_common::limits;
 
-use crate::velocities::{NamedColumns, Table, is_like_subject};
+use crate::velocities::{NamedColumns, VelocityTable, is_like_subject};
 
 /// Fewest velocities of a group, on average, for a search of its own.
 const OF_A_GROUP_MIN: usize = 5;
@@ -43,7 +43,7 @@ pub(super) struct NameColumn {
 
 impl Roles {
     /// Returns the columns' roles.
-    pub(super) fn of(table: &Table) -> Self {
+    pub(super) fn of(table: &VelocityTable) -> Self {
         let columns = named_columns(table);
         let first = |is_group| columns.iter().find(|column| column.is_group == is_group).cloned();
         let (group, subject) = match (first(true), first(false)) {
@@ -82,7 +82,7 @@ impl Roles {
 }
 
 /// Returns the columns that have names which repeat, and seem to name groups or subjects.
-fn named_columns(table: &Table) -> Vec<NameColumn> {
+fn named_columns(table: &VelocityTable) -> Vec<NameColumn> {
     let is_group = |name: &str| LIKE_GROUPS.iter().any(|part| name.contains(part));
     let mut columns: Vec<(usize, bool, BTreeSet<String>)> = Vec::new();
     for (place, name) in table.names().iter().enumerate() {

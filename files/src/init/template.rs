@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::roles::Roles;
-use crate::velocities::Table;
+use crate::velocities::VelocityTable;
 
 /// Everything below `[data]`. The parameters but two are fixed, as two moments determine two.
 const BELOW_DATA: &str = r#"
@@ -66,7 +66,7 @@ pub(super) fn of_data(data: &str) -> String {
 }
 
 /// Returns the section of data of a file.
-pub(super) fn data_section(name: &str, table: &Table, roles: &Roles) -> String {
+pub(super) fn data_section(name: &str, table: &VelocityTable, roles: &Roles) -> String {
     let mut text = format!("[data]\nvelocities = {}\n", quoted(name));
     let mut key = |name: &str, value: String| {
         // Writing to a string cannot fail.

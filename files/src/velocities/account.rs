@@ -1,6 +1,6 @@
 //! What was taken of a file, and what was not.
 
-use super::table::Table;
+use super::table::VelocityTable;
 
 /// Most lines that are named.
 const LINES_MAX: usize = 100;
@@ -28,7 +28,7 @@ pub(crate) struct Account {
 }
 
 impl Account {
-    pub(super) fn of_column(table: &Table) -> Self {
+    pub(super) fn of_column(table: &VelocityTable) -> Self {
         let place = table.place();
         let name = table.names().get(place).map_or("", String::as_str);
         let guess = if table.is_unit_guessed() { ", a guess from their size" } else { "" };

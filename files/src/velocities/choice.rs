@@ -9,9 +9,9 @@ use osteon_common::limits;
 
 use super::csv_format::{CsvFormat, DecimalMark, VelocityUnit};
 use super::header::{Header, velocity_places};
-use super::lines::{Line, Lines};
+use super::lines::{TableLine, TableLines};
 use super::names::ColumnName;
-use super::number::Number;
+use super::number::CellNumber;
 use super::problem::{LocatedProblem, Problem, listed, shortened};
 
 /// Velocities of sound in bone, m/s, as wide as the program accepts them.
@@ -101,10 +101,10 @@ impl ColumnChoice {
 /// Returns the places of columns of which the cells themselves say that they are velocities.
 fn places_with_units(text: &str, header: &Header) -> Vec<usize> {
     let mut places = BTreeSet::new();
-    for line in Lines::of(text, header, None).take(EXAMINED_ROWS) {
-        let Ok((_, Line::Data(fields))) = line else { continue };
+    for line in TableLines::of(text, header, None).take(EXAMINED_ROWS) {
+        let Ok((_, TableLine::Data(fields))) = line else { continue };
         for (place, field) in fields.iter().enumerate() {
-            let read = DecimalMark::ALL.into_iter().find_map(|mark| Number::read(field, mark));
+            let read = DecimalMark::ALL.into_iter().find_map(|mark| CellNumber::read(field, mark));
             if read.is_some_and(|number| number.unit.is_some()) {
                 places.insert(place);
             }
@@ -154,13 +154,15 @@ struct Cells {
 impl Cells {
     fn of(text: &str, header: &Header, place: usize) -> Result<Self, LocatedProblem> {
         let mut cells = Self { place, ..Self::default() };
-        for line in Lines::of(text, header, Some(place)) {
+        for line in TableLines::of(text, header, Some(place)) {
             match line? {
-                (_, Line::Units(units)) => cells.unit_below = units.get(place).copied().flatten(),
-                (line, Line::Data(mut fields)) if place < fields.len() => {
+                (_, TableLine::Units(units)) => {
+                    cells.unit_below = units.get(place).copied().flatten()
+                }
+                (line, TableLine::Data(mut fields)) if place < fields.len() => {
                     cells.add(line, fields.swap_remove(place));
                 }
-                (line, Line::OtherShape(fields)) => {
+                (line, TableLine::OtherShape(fields)) => {
                     cells.other_shape.get_or_insert((line, fields.len()));
                 }
                 _ => {}
@@ -174,7 +176,7 @@ impl Cells {
 
     fn add(&mut self, line: usize, cell: String) {
         self.filled += usize::from(!cell.is_empty());
-        let read = DecimalMark::ALL.map(|mark| Number::read(&cell, mark));
+        let read = DecimalMark::ALL.map(|mark| CellNumber::read(&cell, mark));
         let Some(number) = read.iter().flatten().next() else {
             if self.texts.len() <= TEXTS_MAX {
                 self.texts.entry(cell).or_insert(line);
@@ -190,7 +192,7 @@ impl Cells {
             }
         }
         let is_mark = number.value() <= 0.0 || number.is_nines();
-        let values = read.each_ref().map(|one| one.as_ref().map_or(f64::NAN, Number::value));
+        let values = read.each_ref().map(|one| one.as_ref().map_or(f64::NAN, CellNumber::value));
         if is_mark && self.marks.len() <= TEXTS_MAX {
             self.marks.insert(cell, values);
         }

@@ -12,7 +12,7 @@ use osteon_common::parameters::Parameter;
 use super::account::Account;
 use super::columns::{Columns, Row};
 use super::problem::{Problem, shortened};
-use super::table::Table;
+use super::table::VelocityTable;
 
 /// A column that seems to name subjects is an index of the rows if it has more names than this.
 const UNUSED_NAMES_MAX: usize = 10_000;
@@ -63,7 +63,7 @@ struct CollectedGroup {
 }
 
 impl CollectedVelocities {
-    pub(super) fn new(has_subjects: bool, table: &Table) -> Self {
+    pub(super) fn new(has_subjects: bool, table: &VelocityTable) -> Self {
         Self {
             groups: Vec::new(),
             places: BTreeMap::new(),

@@ -5,9 +5,9 @@ use osteon_common::parameters::Parameter;
 
 use super::choice::ColumnChoice;
 use super::encodings::normalised;
-use super::number::Number;
+use super::number::CellNumber;
 use super::problem::{Problem, shortened};
-use super::table::{Table, place_of};
+use super::table::{VelocityTable, place_of};
 
 /// Names of columns that seem to name the subject of each velocity.
 const LIKE_SUBJECTS: [&str; 7] =
@@ -69,7 +69,10 @@ pub(super) struct Row {
 
 impl<'a> Columns<'a> {
     /// Finds the columns in the header.
-    pub(super) fn of_table(table: &'a Table, named: &NamedColumns<'_>) -> Result<Self, Problem> {
+    pub(super) fn of_table(
+        table: &'a VelocityTable,
+        named: &NamedColumns<'_>,
+    ) -> Result<Self, Problem> {
         let names = table.names();
         let column = |name: Option<&str>, named| match name {
             Some(name) => {
@@ -137,11 +140,11 @@ impl<'a> Columns<'a> {
 
     /// Returns the velocity in a cell, m/s, and whether an error follows it.
     fn velocity_in(&self, field: &str) -> Result<(f64, bool), Problem> {
-        let Some(number) = Number::read(field, self.choice.decimal) else {
+        let Some(number) = CellNumber::read(field, self.choice.decimal) else {
             if field.is_empty() {
                 return Err(Problem::NoNumber);
             }
-            let other = Number::read(field, self.choice.decimal.other());
+            let other = CellNumber::read(field, self.choice.decimal.other());
             return Err(Problem::NotANumber {
                 found: shortened(field),
                 decimal: other.map(|_| self.choice.decimal.other()),

@@ -4,10 +4,10 @@ use super::content::Content;
 use super::csv_format::{CsvFormat, DecimalMark, Separator};
 use super::fields::csv_fields;
 use super::names::ColumnName;
-use super::number::Number;
+use super::number::CellNumber;
 use super::problem::{LocatedProblem, Problem};
-use super::text_lines::{Record, Records};
-use super::units::{self, Unit};
+use super::text_lines::{TextRecord, TextRecords};
+use super::units::{self, NamedUnit};
 
 /// Number of records in which the header is looked for.
 const RECORDS_MAX: usize = 1000;
@@ -43,19 +43,19 @@ impl Header {
     }
 
     /// Returns the records below the header.
-    pub(super) fn rows<'a>(&self, text: &'a str) -> Records<'a> {
-        Records::of(text, self.separator).skip_lines(self.lines_above)
+    pub(super) fn rows<'a>(&self, text: &'a str) -> TextRecords<'a> {
+        TextRecords::of(text, self.separator).skip_lines(self.lines_above)
     }
 }
 
 /// Returns the fields of a line; one that has an open quote is one field.
-pub(super) fn fields_of(record: &Record<'_>, separator: Separator) -> Vec<String> {
+pub(super) fn fields_of(record: &TextRecord<'_>, separator: Separator) -> Vec<String> {
     csv_fields(record.text, separator).unwrap_or_else(|_| vec![record.text.trim().to_owned()])
 }
 
 /// Returns whether a cell is a number, with either decimal mark.
 pub(super) fn is_number(cell: &str) -> bool {
-    DecimalMark::ALL.into_iter().any(|mark| Number::read(cell, mark).is_some())
+    DecimalMark::ALL.into_iter().any(|mark| CellNumber::read(cell, mark).is_some())
 }
 
 /// Returns whether fields are the units of columns rather than values of a row, given the places of
@@ -100,7 +100,7 @@ fn given(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
         None => format.skip_lines.unwrap_or(0),
     };
     let mut above = None;
-    let records = Records::of(&content.text, named.unwrap_or_default()).skip_lines(skipped);
+    let records = TextRecords::of(&content.text, named.unwrap_or_default()).skip_lines(skipped);
     for record in records {
         let record = record?;
         let is_named = format.header_line == Some(record.line);
@@ -251,7 +251,7 @@ fn above_of(text: &str) -> Option<Separator> {
 /// The first records of a text, in which its header is looked for.
 struct Beginning<'a> {
     separator: Separator,
-    records: Vec<(Record<'a>, Vec<String>)>,
+    records: Vec<(TextRecord<'a>, Vec<String>)>,
     /// Which of these have a number.
     have_number: Vec<bool>,
 }
@@ -259,7 +259,7 @@ struct Beginning<'a> {
 impl<'a> Beginning<'a> {
     fn of(text: &'a str, separator: Separator, skipped: usize) -> Result<Self, LocatedProblem> {
         let mut records = Vec::new();
-        for record in Records::of(text, separator).skip_lines(skipped) {
+        for record in TextRecords::of(text, separator).skip_lines(skipped) {
             let record = record?;
             if record.is_blank() || Separator::of_first_line(record.text).is_some() {
                 continue;
@@ -269,8 +269,9 @@ impl<'a> Beginning<'a> {
                 break;
             }
         }
-        let has_number =
-            |(_, fields): &(Record<'_>, Vec<String>)| fields.iter().any(|field| is_number(field));
+        let has_number = |(_, fields): &(TextRecord<'_>, Vec<String>)| {
+            fields.iter().any(|field| is_number(field))
+        };
         let have_number = records.iter().map(has_number).collect();
         Ok(Self { separator, records, have_number })
     }
@@ -348,7 +349,7 @@ impl<'a> Beginning<'a> {
     /// Returns how many records between a header and another place have numbers in one of its columns of
     /// velocities.
     fn rows_below(&self, at: usize, header: &Header, places: &[usize], end: usize) -> usize {
-        let is_row = |(_, fields): &&(Record<'_>, Vec<String>)| {
+        let is_row = |(_, fields): &&(TextRecord<'_>, Vec<String>)| {
             let fields = trimmed(fields.to_vec(), header.names.len());
             fields.len() == header.names.len()
                 && places.iter().any(|&place| is_number(&fields[place]))
@@ -379,7 +380,7 @@ impl<'a> Beginning<'a> {
         let width = self.records[first].1.len();
         let rows = self.records[first..].iter().filter(|(_, fields)| fields.len() == width).count();
         let names_of =
-            |record: &Record<'_>| names_in(record.text, self.separator).unwrap_or_default();
+            |record: &TextRecord<'_>| names_in(record.text, self.separator).unwrap_or_default();
         let above = self.records[..first]
             .iter()
             .rposition(|(record, _)| names_of(record).len() == width)
@@ -414,5 +415,5 @@ pub(super) fn velocity_places(names: &[String]) -> Vec<usize> {
 }
 
 fn is_velocity_unit(name: &str) -> bool {
-    matches!(units::of_text(name), Some(Unit::Velocity(_) | Unit::OtherVelocity))
+    matches!(units::of_text(name), Some(NamedUnit::Velocity(_) | NamedUnit::OtherVelocity))
 }

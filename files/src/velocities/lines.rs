@@ -4,13 +4,13 @@ use super::csv_format::VelocityUnit;
 use super::fields::csv_fields;
 use super::header::{Header, are_units, is_rule, trimmed};
 use super::problem::LocatedProblem;
-use super::statistics::Label;
-use super::text_lines::Records;
+use super::statistics::SummaryLabel;
+use super::text_lines::TextRecords;
 use super::units;
 
 /// A line that is neither empty nor a comment.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Line {
+pub(super) enum TableLine {
     /// The units of the columns, directly below the header.
     Units(Vec<Option<VelocityUnit>>),
     /// The header again.
@@ -18,7 +18,7 @@ pub(super) enum Line {
     /// A line that is drawn, or has only separators.
     Rule,
     /// A row that says of itself that it sums up others.
-    Labelled { label: Label, fields: Vec<String> },
+    Labelled { label: SummaryLabel, fields: Vec<String> },
     /// A row, with as many fields as there are names.
     Data(Vec<String>),
     /// A row with another number of fields.
@@ -28,8 +28,8 @@ pub(super) enum Line {
 }
 
 /// The lines below a header.
-pub(super) struct Lines<'a> {
-    records: Records<'a>,
+pub(super) struct TableLines<'a> {
+    records: TextRecords<'a>,
     header: &'a Header,
     /// Place of the velocities, if it is known.
     place: Option<usize>,
@@ -39,44 +39,48 @@ pub(super) struct Lines<'a> {
     pub(super) is_after_gap: bool,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> TableLines<'a> {
     pub(super) fn of(text: &'a str, header: &'a Header, place: Option<usize>) -> Self {
         let records = header.rows(text);
         Self { records, header, place, is_first: true, is_after_gap: false }
     }
 
-    fn line(&mut self, fields: Vec<String>) -> Line {
+    fn line(&mut self, fields: Vec<String>) -> TableLine {
         let fields = trimmed(fields, self.header.names.len());
         if fields.iter().all(String::is_empty) && fields.len() > 1 || is_rule(&fields) {
-            return Line::Rule;
+            return TableLine::Rule;
         }
         if self.is_first && are_units(&fields, self.place.as_slice()) && self.header.line > 0 {
             self.is_first = false;
-            return Line::Units(fields.iter().map(|field| units::of_velocity(field)).collect());
+            return TableLine::Units(
+                fields.iter().map(|field| units::of_velocity(field)).collect(),
+            );
         }
         if self.header.line > 0 && is_header(&fields, &self.header.names) {
-            return Line::RepeatedHeader;
+            return TableLine::RepeatedHeader;
         }
         self.is_first = false;
         if let Some(label) = self.label(&fields) {
-            return Line::Labelled { label, fields };
+            return TableLine::Labelled { label, fields };
         }
         match fields.len() == self.header.names.len() {
-            true => Line::Data(fields),
-            false => Line::OtherShape(fields),
+            true => TableLine::Data(fields),
+            false => TableLine::OtherShape(fields),
         }
     }
 
     /// Returns the label by which a row sums up others: in its first cell that is not empty, in the cell before
     /// the velocity, or in that of the velocity.
-    fn label(&self, fields: &[String]) -> Option<Label> {
+    fn label(&self, fields: &[String]) -> Option<SummaryLabel> {
         let place = self.place?;
         let first = fields.iter().find(|field| !field.is_empty())?;
         let before = place.checked_sub(1).and_then(|place| fields.get(place));
         let of_place = fields.get(place).filter(|field| *field != first);
-        Label::of(first)
-            .or_else(|| before.filter(|field| *field != first).and_then(|field| Label::of(field)))
-            .or_else(|| of_place.and_then(|field| Label::of(field)))
+        SummaryLabel::of(first)
+            .or_else(|| {
+                before.filter(|field| *field != first).and_then(|field| SummaryLabel::of(field))
+            })
+            .or_else(|| of_place.and_then(|field| SummaryLabel::of(field)))
     }
 }
 
@@ -90,8 +94,8 @@ fn is_header(fields: &[String], names: &[String]) -> bool {
     fields == names
 }
 
-impl Iterator for Lines<'_> {
-    type Item = Result<(usize, Line), LocatedProblem>;
+impl Iterator for TableLines<'_> {
+    type Item = Result<(usize, TableLine), LocatedProblem>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.is_after_gap = false;
@@ -107,7 +111,7 @@ impl Iterator for Lines<'_> {
                 continue;
             }
             let fields = csv_fields(record.text, self.header.separator);
-            let line = fields.map_or(Line::OpenQuote, |fields| self.line(fields));
+            let line = fields.map_or(TableLine::OpenQuote, |fields| self.line(fields));
             return Some(Ok((record.line, line)));
         }
     }

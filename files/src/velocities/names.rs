@@ -1,7 +1,7 @@
 //! What the name of a column says about its values: by its words, and by a unit in it.
 
 use super::csv_format::VelocityUnit;
-use super::units::{self, Unit, folded};
+use super::units::{self, NamedUnit, folded};
 
 /// Words of velocities, in lower case; a name contains one.
 const VELOCITY: [&str; 26] = [
@@ -148,7 +148,7 @@ enum Word {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ColumnName {
     word: Word,
-    unit: Option<Unit>,
+    unit: Option<NamedUnit>,
 }
 
 impl ColumnName {
@@ -165,9 +165,9 @@ impl ColumnName {
     /// Returns whether values below this name are velocities, if they have the size of some.
     pub(super) fn is_of_velocities(self) -> bool {
         match (self.unit, self.word) {
-            (_, Word::Scatter) | (Some(Unit::Other), _) => false,
+            (_, Word::Scatter) | (Some(NamedUnit::Other), _) => false,
             (_, Word::Velocity) | (None, Word::Symbol) => true,
-            (Some(Unit::Velocity(_)), word) => word != Word::Other,
+            (Some(NamedUnit::Velocity(_)), word) => word != Word::Other,
             _ => false,
         }
     }
@@ -185,14 +185,14 @@ impl ColumnName {
     /// Returns the unit of velocity in it.
     pub(super) fn velocity_unit(self) -> Option<VelocityUnit> {
         match self.unit {
-            Some(Unit::Velocity(unit)) => Some(unit),
+            Some(NamedUnit::Velocity(unit)) => Some(unit),
             _ => None,
         }
     }
 
     /// Returns whether it has a unit of velocity that no job file can name.
     pub(super) fn has_other_velocity_unit(self) -> bool {
-        self.unit == Some(Unit::OtherVelocity)
+        self.unit == Some(NamedUnit::OtherVelocity)
     }
 }
 
@@ -237,7 +237,7 @@ fn is_symbol(words: &[&str]) -> bool {
 }
 
 /// Returns a name without its unit, and the unit.
-fn split_unit(name: &str) -> (String, Option<Unit>) {
+fn split_unit(name: &str) -> (String, Option<NamedUnit>) {
     let name = name.trim();
     // In brackets any unit counts.
     let mut rest = name;
@@ -266,7 +266,7 @@ fn split_unit(name: &str) -> (String, Option<Unit>) {
 
 /// Returns the unit that the last words of a name are, with what stands before them: "pulse_speed_m_s",
 /// "tof_us", "SV m/s".
-fn last_words(name: &str) -> (String, Option<Unit>) {
+fn last_words(name: &str) -> (String, Option<NamedUnit>) {
     let parts: Vec<&str> = name.split(['_', ' ']).filter(|part| !part.is_empty()).collect();
     for count in (1..=4.min(parts.len().saturating_sub(1))).rev() {
         let (before, last) = parts.split_at(parts.len() - count);
@@ -276,7 +276,7 @@ fn last_words(name: &str) -> (String, Option<Unit>) {
         let unit = units::of_text(&joined).or_else(|| units::of_text(&spaced));
         match unit {
             // One letter is more often a part of a symbol.
-            Some(Unit::Other) if spaced.chars().count() == 1 => {}
+            Some(NamedUnit::Other) if spaced.chars().count() == 1 => {}
             Some(unit) => return (before.join(" "), Some(unit)),
             None => {}
         }

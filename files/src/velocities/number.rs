@@ -20,7 +20,7 @@ const BEFORE_ERROR: [&str; 3] = ["\u{b1}", "+/-", "+-"];
 
 /// A number, and what stands with it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Number {
+pub(super) struct CellNumber {
     /// The cell.
     text: String,
     /// Sign, digits and decimal point.
@@ -32,7 +32,7 @@ pub(super) struct Number {
     pub(super) has_error: bool,
 }
 
-impl Number {
+impl CellNumber {
     /// Reads a cell.
     pub(super) fn read(text: &str, decimal: DecimalMark) -> Option<Self> {
         if text.len() > 4 * CHARACTERS_MAX {
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn a_number_is_read_as_people_write_it() {
         let check = |text: &str, decimal, expected: Option<f64>| {
-            let read = Number::read(text, decimal).map(|number| number.value());
+            let read = CellNumber::read(text, decimal).map(|number| number.value());
             assert_eq!(read, expected, "{text:?} with {decimal:?}");
         };
         let (point, comma) = (DecimalMark::Point, DecimalMark::Comma);
@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn a_velocity_is_the_same_to_the_bit_in_every_unit_and_with_every_mark() {
         let velocity =
-            |text: &str, decimal, unit| Some(Number::read(text, decimal)?.velocity(unit));
+            |text: &str, decimal, unit| Some(CellNumber::read(text, decimal)?.velocity(unit));
         let (point, comma) = (DecimalMark::Point, DecimalMark::Comma);
         for unit in [VelocityUnit::KilometrePerSecond, VelocityUnit::MillimetrePerMicrosecond] {
             for (text, decimal, expected) in [
@@ -299,7 +299,7 @@ mod tests {
         for (text, expected) in
             [("3908", 0.5), ("3908.5", 0.05), ("3.90 km/s", 5.0), ("4e3", 500.0)]
         {
-            let number = Number::read(text, DecimalMark::Point).unwrap();
+            let number = CellNumber::read(text, DecimalMark::Point).unwrap();
             let rounding = number.rounding(VelocityUnit::MetrePerSecond);
             assert!((rounding / expected - 1.0).abs() < 1e-12, "{text}: {rounding}");
         }

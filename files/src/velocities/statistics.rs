@@ -158,14 +158,14 @@ const BYTES_MAX: usize = 80;
 
 /// The label of a row that seems to sum up others.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Label {
+pub(super) struct SummaryLabel {
     pub(super) text: String,
     pub(super) statistic: Statistic,
     /// Whether it may be somebody's name.
     pub(super) is_like_name: bool,
 }
 
-impl Label {
+impl SummaryLabel {
     /// Returns the label that a cell is.
     pub(super) fn of(cell: &str) -> Option<Self> {
         let begins = cell.chars().next()?;
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn labels_are_told_from_names() {
         let check = |text: &str, expected: Option<Statistic>| {
-            assert_eq!(Label::of(text).map(|label| label.statistic), expected, "{text}");
+            assert_eq!(SummaryLabel::of(text).map(|label| label.statistic), expected, "{text}");
         };
         for (text, expected) in [
             ("Mean", Statistic::Mean),
@@ -295,8 +295,8 @@ mod tests {
         for text in ["P1", "A", "Max M\u{fc}ller", "Meaney", "12", "", "left", "total hip left"] {
             check(text, None);
         }
-        assert!(Label::of("SD").is_some_and(|label| label.is_like_name));
-        assert!(Label::of("Mean").is_some_and(|label| !label.is_like_name));
+        assert!(SummaryLabel::of("SD").is_some_and(|label| label.is_like_name));
+        assert!(SummaryLabel::of("Mean").is_some_and(|label| !label.is_like_name));
     }
 
     #[test]

@@ -10,10 +10,10 @@ use osteon_common::limits;
 
 use super::choice::{ColumnChoice, POSSIBLE};
 use super::header::Header;
-use super::lines::{Line, Lines};
-use super::number::Number;
+use super::lines::{TableLine, TableLines};
+use super::number::CellNumber;
 use super::problem::{LocatedProblem, Problem, shortened};
-use super::statistics::{Label, Statistic, Statistics};
+use super::statistics::{Statistic, Statistics, SummaryLabel};
 
 /// Most rows that may seem to sum up others.
 const ROWS_MAX: usize = 2000;
@@ -37,8 +37,8 @@ pub(super) type Summaries = BTreeMap<usize, String>;
 /// A row that may sum up others.
 struct Suspect {
     line: usize,
-    label: Option<Label>,
-    value: Option<Number>,
+    label: Option<SummaryLabel>,
+    value: Option<CellNumber>,
     /// Number of velocities above it.
     above: usize,
     /// Whether it stands apart from the rows above it.
@@ -51,17 +51,17 @@ pub(super) fn of_table(
     header: &Header,
     choice: &ColumnChoice,
 ) -> Result<Summaries, LocatedProblem> {
-    let mut rows = Rows::of(text, header, choice, true)?;
+    let mut rows = SeenRows::of(text, header, choice, true)?;
     if rows.suspects.iter().filter(|one| one.label.is_none()).count() > BARE_MAX {
         // Where many rows have only a velocity, that says nothing.
-        rows = Rows::of(text, header, choice, false)?;
+        rows = SeenRows::of(text, header, choice, false)?;
     }
     rows.verdicts(choice)
 }
 
 /// What was seen of a table.
 #[derive(Default)]
-struct Rows {
+struct SeenRows {
     /// Velocities of rows that sum up nothing.
     velocities: Vec<f64>,
     /// By how much these may have been rounded.
@@ -73,7 +73,7 @@ struct Rows {
     filled: usize,
 }
 
-impl Rows {
+impl SeenRows {
     fn of(
         text: &str,
         header: &Header,
@@ -81,19 +81,19 @@ impl Rows {
         are_bare_noticed: bool,
     ) -> Result<Self, LocatedProblem> {
         let mut rows = Self { rounding: f64::INFINITY, ..Self::default() };
-        let mut lines = Lines::of(text, header, Some(choice.place));
+        let mut lines = TableLines::of(text, header, Some(choice.place));
         // A label may stand on a line of its own, above its value.
-        let mut waiting: Option<Label> = None;
+        let mut waiting: Option<SummaryLabel> = None;
         let mut other_shapes = 0;
         while let Some(line) = lines.next() {
             let is_apart = lines.is_after_gap;
             let (line, label, fields) = match line? {
-                (line, Line::Data(fields)) => {
+                (line, TableLine::Data(fields)) => {
                     rows.count += 1;
                     (line, waiting.take(), fields)
                 }
-                (line, Line::Labelled { label, fields }) => (line, Some(label), fields),
-                (_, Line::OtherShape(_)) => {
+                (line, TableLine::Labelled { label, fields }) => (line, Some(label), fields),
+                (_, TableLine::OtherShape(_)) => {
                     other_shapes += 1;
                     // The rows will be refused, or are all above.
                     if other_shapes > OTHER_SHAPES_MAX {
@@ -104,7 +104,7 @@ impl Rows {
                 _ => continue,
             };
             let cell = fields.get(choice.place).map_or("", String::as_str);
-            let value = Number::read(cell, choice.decimal)
+            let value = CellNumber::read(cell, choice.decimal)
                 .filter(|_| !choice.missing.iter().any(|missing| missing == cell));
             if value.is_none() && label.as_ref().is_some_and(|label| label.text == cell) {
                 waiting = label.clone();
@@ -136,7 +136,7 @@ impl Rows {
         Ok(rows)
     }
 
-    fn add(&mut self, value: &Number, choice: &ColumnChoice) {
+    fn add(&mut self, value: &CellNumber, choice: &ColumnChoice) {
         self.velocities.push(value.velocity(choice.unit));
         // Zeros at the end may have been left away.
         self.rounding = self.rounding.min(value.rounding(choice.unit));
@@ -226,7 +226,7 @@ impl Rows {
 impl Suspect {
     /// Returns what stands for it in a message.
     fn shown(&self) -> String {
-        let value = self.value.as_ref().map_or("", Number::text);
+        let value = self.value.as_ref().map_or("", CellNumber::text);
         let text = self.label.as_ref().map_or(value, |label| label.text.as_str());
         format!("{:?}", shortened(text))
     }
@@ -236,7 +236,7 @@ impl Suspect {
         let statistic = self.label.as_ref().map_or(Statistic::Mean, |label| label.statistic);
         let problem = Problem::DoubtfulSummary {
             label: self.label.as_ref().map_or_else(String::new, |label| shortened(&label.text)),
-            found: shortened(self.value.as_ref().map_or("", Number::text)),
+            found: shortened(self.value.as_ref().map_or("", CellNumber::text)),
             others: all.map_or(f64::NAN, |all| all.value(statistic)),
         };
         (Some(self.line), problem)

@@ -7,15 +7,15 @@ use super::content::Content;
 use super::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
 use super::encodings::normalised;
 use super::header::Header;
-use super::lines::{Line, Lines};
-use super::number::Number;
+use super::lines::{TableLine, TableLines};
+use super::number::CellNumber;
 use super::opening;
 use super::problem::{COLUMN, LocatedProblem, Problem, listed, shortened};
 use super::summaries::{self, Summaries};
 
 /// The table of a file: its text, and how it is read.
 #[derive(Debug)]
-pub(crate) struct Table {
+pub(crate) struct VelocityTable {
     pub(super) content: Content,
     pub(super) header: Header,
     pub(super) choice: ColumnChoice,
@@ -23,7 +23,7 @@ pub(crate) struct Table {
     pub(super) summaries: Summaries,
 }
 
-impl Table {
+impl VelocityTable {
     /// Reads the file at `path`, and finds out how it is written as far as no key says it.
     pub(super) fn open(path: &Path, format: &CsvFormat) -> Result<Self, LocatedProblem> {
         let format = &CsvFormat {
@@ -147,7 +147,7 @@ impl Table {
     /// in it can be a velocity.
     pub(super) fn is_below(&self, fields: &[String]) -> bool {
         let is_possible = |field: &String| {
-            Number::read(field, self.decimal())
+            CellNumber::read(field, self.decimal())
                 .is_some_and(|number| POSSIBLE.contains(&number.velocity(self.unit())))
         };
         let first = fields.iter().find(|field| !field.is_empty());
@@ -204,9 +204,9 @@ impl Table {
 
     /// Returns the cells of each row that is a measurement or has a missing value.
     pub(crate) fn rows(&self) -> impl Iterator<Item = Vec<String>> {
-        let lines = Lines::of(&self.content.text, &self.header, Some(self.choice.place));
+        let lines = TableLines::of(&self.content.text, &self.header, Some(self.choice.place));
         lines.filter_map(|line| match line.ok()? {
-            (line, Line::Data(fields) | Line::Labelled { fields, .. }) => {
+            (line, TableLine::Data(fields) | TableLine::Labelled { fields, .. }) => {
                 let is_row = fields.len() == self.header.names.len();
                 (is_row && !self.summaries.contains_key(&line)).then_some(fields)
             }
@@ -238,7 +238,8 @@ pub(super) fn place_of(names: &[String], column: &str) -> Result<usize, Problem>
 
 /// Refuses a unit below the header that is not that of the job.
 fn check_units(text: &str, header: &Header, choice: &ColumnChoice) -> Result<(), LocatedProblem> {
-    let Some(Ok((line, Line::Units(units)))) = Lines::of(text, header, Some(choice.place)).next()
+    let Some(Ok((line, TableLine::Units(units)))) =
+        TableLines::of(text, header, Some(choice.place)).next()
     else {
         return Ok(());
     };

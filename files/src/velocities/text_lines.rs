@@ -13,13 +13,13 @@ const SEARCHES_MAX: usize = 100;
 
 /// A line, or several with a quoted field that goes on over their ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Record<'a> {
+pub(super) struct TextRecord<'a> {
     /// Number of the first line, from 1.
     pub(super) line: usize,
     pub(super) text: &'a str,
 }
 
-impl Record<'_> {
+impl TextRecord<'_> {
     /// Returns whether it has nothing to read: neither a value nor a name.
     pub(super) fn is_blank(&self) -> bool {
         self.text.trim().is_empty()
@@ -33,7 +33,7 @@ impl Record<'_> {
 
 /// The records of a text.
 #[derive(Debug, Clone)]
-pub(super) struct Records<'a> {
+pub(super) struct TextRecords<'a> {
     rest: &'a str,
     /// Number of the next line, from 1.
     line: usize,
@@ -42,7 +42,7 @@ pub(super) struct Records<'a> {
     searches: usize,
 }
 
-impl<'a> Records<'a> {
+impl<'a> TextRecords<'a> {
     /// Returns the records of a text whose fields are separated so.
     pub(super) fn of(text: &'a str, separator: Separator) -> Self {
         Self { rest: text, line: 1, separator, searches: SEARCHES_MAX }
@@ -89,8 +89,8 @@ impl<'a> Records<'a> {
     }
 }
 
-impl<'a> Iterator for Records<'a> {
-    type Item = Result<Record<'a>, LocatedProblem>;
+impl<'a> Iterator for TextRecords<'a> {
+    type Item = Result<TextRecord<'a>, LocatedProblem>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.rest.is_empty() {
@@ -113,7 +113,7 @@ impl<'a> Iterator for Records<'a> {
             self.rest = split_line(self.rest).1;
         }
         self.line += lines;
-        Some(Ok(Record { line, text }))
+        Some(Ok(TextRecord { line, text }))
     }
 }
 
@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     fn records(text: &str) -> Vec<(usize, &str)> {
-        Records::of(text, Separator::Comma)
+        TextRecords::of(text, Separator::Comma)
             .map(|record| record.map_or((0, ""), |record| (record.line, record.text)))
             .collect()
     }
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn lines_are_skipped_whatever_is_in_them() {
-        let rest = Records::of("\"open\nx\nvelocity\n", Separator::Comma).skip_lines(2);
+        let rest = TextRecords::of("\"open\nx\nvelocity\n", Separator::Comma).skip_lines(2);
         let found: Vec<_> = rest.map(|record| record.map(|record| record.line)).collect();
         assert!(matches!(found[..], [Ok(3)]));
     }

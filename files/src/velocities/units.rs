@@ -6,7 +6,7 @@ use super::csv_format::VelocityUnit;
 
 /// What a text names as a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Unit {
+pub(super) enum NamedUnit {
     /// A unit that a job file can name.
     Velocity(VelocityUnit),
     /// Another unit of velocity.
@@ -127,13 +127,13 @@ pub(super) fn folded(text: &str) -> String {
 /// Returns the unit of velocity that a text is, if a job file can name it.
 pub(super) fn of_velocity(text: &str) -> Option<VelocityUnit> {
     match of_text(text) {
-        Some(Unit::Velocity(unit)) => Some(unit),
+        Some(NamedUnit::Velocity(unit)) => Some(unit),
         _ => None,
     }
 }
 
 /// Returns the unit that a text is, with or without brackets around it.
-pub(super) fn of_text(text: &str) -> Option<Unit> {
+pub(super) fn of_text(text: &str) -> Option<NamedUnit> {
     if text.len() > 80 {
         return None;
     }
@@ -141,17 +141,17 @@ pub(super) fn of_text(text: &str) -> Option<Unit> {
     let text = text.trim().trim_matches(['(', ')', '[', ']', '{', '}', '<', '>', ' ']);
     let short = shortened(text);
     match short.as_str() {
-        "m/s" | "mps" => Some(Unit::Velocity(VelocityUnit::MetrePerSecond)),
-        "km/s" => Some(Unit::Velocity(VelocityUnit::KilometrePerSecond)),
-        "mm/us" => Some(Unit::Velocity(VelocityUnit::MillimetrePerMicrosecond)),
+        "m/s" | "mps" => Some(NamedUnit::Velocity(VelocityUnit::MetrePerSecond)),
+        "km/s" => Some(NamedUnit::Velocity(VelocityUnit::KilometrePerSecond)),
+        "mm/us" => Some(NamedUnit::Velocity(VelocityUnit::MillimetrePerMicrosecond)),
         other => {
             let parts = other.split_once('/');
             let is_velocity = parts
                 .is_some_and(|(length, time)| LENGTHS.contains(&length) && TIMES.contains(&time));
             if is_velocity {
-                return Some(Unit::OtherVelocity);
+                return Some(NamedUnit::OtherVelocity);
             }
-            OTHERS.contains(&other).then_some(Unit::Other)
+            OTHERS.contains(&other).then_some(NamedUnit::Other)
         }
     }
 }
@@ -190,8 +190,8 @@ mod tests {
     #[test]
     fn a_unit_is_read_as_people_write_it() {
         let check =
-            |text: &str, expected: Option<Unit>| assert_eq!(of_text(text), expected, "{text}");
-        let velocity = |unit| Some(Unit::Velocity(unit));
+            |text: &str, expected: Option<NamedUnit>| assert_eq!(of_text(text), expected, "{text}");
+        let velocity = |unit| Some(NamedUnit::Velocity(unit));
         for text in [
             "m/s",
             "M/SEC",
@@ -224,10 +224,10 @@ mod tests {
             check(text, velocity(VelocityUnit::MillimetrePerMicrosecond));
         }
         for text in ["ft/s", "cm/us", "mm/s", "km/h"] {
-            check(text, Some(Unit::OtherVelocity));
+            check(text, Some(NamedUnit::OtherVelocity));
         }
         for text in ["MPa", "[us]", "\u{b5}s", "\u{b0}C", "kHz", "kg/m\u{b3}", "dB/cm", "%"] {
-            check(text, Some(Unit::Other));
+            check(text, Some(NamedUnit::Other));
         }
         for text in ["", "velocity", "no sensor", "m/", "a/s"] {
             check(text, None);
