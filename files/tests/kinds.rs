@@ -33,7 +33,9 @@ fn takes(text: &str, expected: &[f64], said: &str) {
 
 fn takes_bytes(bytes: &[u8], expected: &[f64], said: &str) {
     let shown = String::from_utf8_lossy(bytes);
-    let (all, velocities) = taken(bytes).unwrap_or_else(|error| panic!("{shown}: {error}"));
+    let found = taken(bytes);
+    assert!(found.is_ok(), "{shown}: {found:?}");
+    let (all, velocities) = found.unwrap();
     assert_eq!(velocities, expected, "{shown}: {all}");
     assert!(all.contains(said), "{said} is not in: {all}");
 }

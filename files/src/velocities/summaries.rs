@@ -51,17 +51,17 @@ pub(super) fn of_table(
     header: &Header,
     choice: &ColumnChoice,
 ) -> Result<Summaries, LocatedProblem> {
-    let mut rows = SeenRows::of(text, header, choice, true)?;
+    let mut rows = SummedRows::of(text, header, choice, true)?;
     if rows.suspects.iter().filter(|one| one.label.is_none()).count() > BARE_MAX {
         // Where many rows have only a velocity, that says nothing.
-        rows = SeenRows::of(text, header, choice, false)?;
+        rows = SummedRows::of(text, header, choice, false)?;
     }
     rows.verdicts(choice)
 }
 
 /// What was seen of a table.
 #[derive(Default)]
-struct SeenRows {
+struct SummedRows {
     /// Velocities of rows that sum up nothing.
     velocities: Vec<f64>,
     /// By how much these may have been rounded.
@@ -73,7 +73,7 @@ struct SeenRows {
     filled: usize,
 }
 
-impl SeenRows {
+impl SummedRows {
     fn of(
         text: &str,
         header: &Header,
