@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Write a first job file for a CSV file of velocities, and say what was understood of it
+    /// Write a first job file for a file of velocities, and say what was understood of it
     Init(InitArguments),
     /// Find the mean elasticity and dispersion that reproduce the measured velocities
     Identify(RunArguments),
@@ -415,7 +415,8 @@ pub(crate) struct TokenArguments {
 /// Arguments of `init`.
 #[derive(Debug, Args)]
 pub(crate) struct InitArguments {
-    /// CSV file with a header and a velocity in each row, in any of the usual formats; if omitted, the
+    /// File with a header and a velocity in each row: CSV in any of the usual formats, also packed by gzip, an
+    /// Excel workbook (.xlsx), or a MATLAB or HDF5 file; if omitted, the
     /// job file has a placeholder for it
     #[arg(value_name = "CSV")]
     pub(crate) velocities: Option<PathBuf>,

@@ -95,6 +95,14 @@ impl CommandFailure {
     }
 }
 
+/// Returns whether a file would have grown above the limit of the session.
+fn is_above_limit(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        let cause = cause.downcast_ref::<std::io::Error>();
+        cause.is_some_and(|cause| cause.kind() == std::io::ErrorKind::FileTooLarge)
+    })
+}
+
 impl fmt::Display for CommandFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -108,6 +116,9 @@ impl fmt::Display for CommandFailure {
                         write!(f, ": {text}")?;
                         told.push_str(&text);
                     }
+                }
+                if is_above_limit(error) {
+                    f.write_str(" (the limit on the size of files of this session: ulimit -f)")?;
                 }
                 Ok(())
             }

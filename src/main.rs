@@ -78,6 +78,7 @@ fn run(arguments: Arguments, log_format: &mut LogFormat) -> Result<ExitStatus, C
         .map_err(|error| {
             CommandFailure::failed(anyhow::Error::new(error).context("cannot start"))
         })?;
+    runtime.block_on(async { signals::report_large_files() });
     // Its client needs the runtime, and outlives the command.
     let telemetry = runtime.block_on(async { Telemetry::start(&resolved) })?;
     let result = runtime.block_on(commands::run(resolved));

@@ -240,6 +240,15 @@ impl Drop for ResultsDirectory {
 /// # Errors
 /// Bad input if the path cannot be a directory, failed if the machine has no room for it.
 pub(crate) fn make_directory(path: &Path) -> Result<(), CommandFailure> {
+    // A link to nothing is there for the system, and nowhere for the user.
+    if let Ok(target) = fs::read_link(path)
+        && !path.exists()
+    {
+        let (shown, target) = (visible::path(path), visible::path(&target));
+        return Err(CommandFailure::bad_input(anyhow::anyhow!(
+            "{shown} is a link to {target}, which does not exist; create that directory, or remove the link"
+        )));
+    }
     fs::create_dir_all(path).map_err(|error| {
         CommandFailure::unusable_path(
             error,

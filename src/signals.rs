@@ -14,6 +14,13 @@ const SIGNAL_DEBOUNCE: Duration = Duration::from_millis(300);
 /// A command that cannot stop, because nobody reads its output, is killed after this long.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// From the call on, a file that grows above the limit of the session (`ulimit -f`) is an error of its write, which
+/// the program can report, and does not end the process. Must be called within the runtime.
+pub(crate) fn report_large_files() {
+    // A handler stays for the life of the process; without one, the limit is as sudden as before.
+    drop(signal(SignalKind::from_raw(rustix::process::Signal::XFSZ.as_raw())));
+}
+
 /// Completes at the first SIGINT or SIGTERM after the call; from the call on, these signals do not
 /// end the process by themselves. SIGHUP is left alone, so that `nohup` keeps its effect, unless
 /// [`hangups`] handles it.

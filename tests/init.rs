@@ -32,8 +32,8 @@ fn a_spreadsheet_becomes_a_job_that_runs() {
     let said = run(&["init", text(&csv)]);
     assert_eq!(said.code, Some(0), "{}", said.stderr);
     let expected = [
-        "25 rows of 3 columns: fields separated by semicolons, decimal commas, windows-1252",
-        "24 velocities in the column \"FAS (km/s)\" (unit km/s), mean 39",
+        "header in line 1, fields separated by semicolons, decimal commas, windows-1252",
+        "24 velocities from line 3 to 26, column 3 \"FAS (km/s)\" (unit km/s), mean 39",
         "1 row is left out: the velocity is \"\"",
         "2 groups in the column \"Gruppe\": a search for each",
         "subjects in the column \"Patient\"",
@@ -61,6 +61,9 @@ fn what_cannot_be_run_yet_is_said_at_once() {
     assert_eq!(said.code, Some(2));
     assert!(said.stderr.contains("was written, but cannot be run yet"), "{}", said.stderr);
     assert!(said.stderr.contains("line 4: velocity is 39000.0"), "{}", said.stderr);
+    let printed = run(&["init", text(&csv), "-o", "-"]);
+    assert_eq!(printed.code, Some(2));
+    assert!(printed.stderr.contains("line 4: velocity is 39000.0"), "{}", printed.stderr);
     let nothing = run(&["init", text(&scratch.write("w.csv", "a,b\nx,y\n"))]);
     assert_eq!(nothing.code, Some(2));
     assert!(!scratch.path("w.toml").exists());

@@ -262,6 +262,13 @@ fn a_posterior_is_finite_everywhere() {
     };
     assert!(gradient([1.0, 1.0])[0] < 0.0);
     assert_eq!(gradient([0.0, 10.0]), [0.0, 0.0]);
+    // Values in SI units are no point outside, but a mistake that a sampler would never show.
+    let mistaken = log(&[20e9, 0.1], json!({}));
+    assert_eq!(mistaken.status, 400, "{mistaken:?}");
+    assert!(
+        mistaken.body.contains("the input is in SI units, and multiples are meant"),
+        "{mistaken:?}"
+    );
     let refused = log(&[1.0, 1.0], json!({"group": "a"}));
     assert!(refused.body.contains("but the data have no groups"), "{refused:?}");
 }

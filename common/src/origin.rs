@@ -14,6 +14,8 @@ pub struct Origin {
     pub unused_subjects: Option<String>,
     /// Number of rows that were left out, as a value was missing.
     pub left_out: u32,
+    /// Rows that are no measurements, such as their mean, and were left out: as in `line 70 "Mean"`.
+    pub no_rows: Vec<String>,
 }
 
 impl Origin {

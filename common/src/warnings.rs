@@ -14,6 +14,8 @@ use crate::robust::outliers;
 
 use crate::plausible::{self, PlausibleRange, short};
 
+/// Most rows that are named which are no measurements.
+const NO_ROWS_MAX: usize = 5;
 /// A velocity that differs from the median by more than this factor is probably in another unit.
 const FACTOR: f64 = 3.0;
 /// Maximum number of outliers that are listed for one set.
@@ -153,6 +155,15 @@ impl Warnings {
                 _ => format!("{left_out} rows have a missing value and are left out"),
             };
             self.add("data.missing", message);
+        }
+        if let Some(rows) = origin.map(|origin| &origin.no_rows).filter(|rows| !rows.is_empty()) {
+            let message = format!(
+                "{} of the file {} no measurement and left out: {}",
+                if rows.len() == 1 { "a line".to_owned() } else { format!("{} lines", rows.len()) },
+                if rows.len() == 1 { "is" } else { "are" },
+                rows.iter().take(NO_ROWS_MAX).map(String::as_str).collect::<Vec<_>>().join(", ")
+            );
+            self.add("data.velocities", message);
         }
         match &data.measurements {
             Measurements::Moments { mean, coefficient_of_variation, .. } => {
@@ -357,6 +368,7 @@ mod tests {
             lines: vec![(2..22).collect()],
             unused_subjects: Some("patient".to_owned()),
             left_out: 0,
+            no_rows: Vec::new(),
         };
         let mut warnings = Warnings::default();
         warnings.data(&Data::from_velocities(velocities), Some(&origin));
@@ -388,6 +400,7 @@ mod tests {
             lines: vec![(2..42).collect()],
             unused_subjects: None,
             left_out: 0,
+            no_rows: Vec::new(),
         };
         assert_eq!(
             warnings(&velocities, Some(&origin)),

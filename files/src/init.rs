@@ -1,47 +1,37 @@
-//! A first job file for a CSV file of velocities, as people have them.
+//! A first job file for a file of velocities, as people have them.
 //!
-//! The file is looked at as a whole: its encoding, separator, decimal mark, the column of velocities
-//! and their unit, texts that stand for missing values, columns of groups and subjects. What was
-//! understood is said in words, and written as keys of `[data]`, so that nothing is guessed again when
-//! the job is run.
+//! How the file is written is found out by the reader of jobs ([`crate::velocities`]); here are added the
+//! columns of groups and subjects. What was understood is said in words, and written as keys of `[data]`,
+//! so that nothing is guessed again when the job is run.
 
-mod layout;
 mod roles;
 mod template;
 
-use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use osteon_common::{limits, visible};
 use thiserror::Error;
 
-use crate::user_file;
+use crate::velocities::{self, CsvError};
 
-use self::layout::Layout;
 use self::roles::Roles;
 
 pub use self::template::without_data;
 
-/// Why no job file can be written for a CSV file.
+/// Why no job file can be written for a file of velocities.
 #[derive(Debug, Error)]
-pub enum InitError {
-    /// The file cannot be read.
-    #[error("{} cannot be read: {cause}", visible::path(path))]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The error of the operating system.
-        cause: std::io::Error,
-    },
-    /// It is not understood.
-    #[error("{}: {reason}", visible::path(path))]
-    NotUnderstood {
-        /// The file.
-        path: PathBuf,
-        /// The reason, and what to do.
-        reason: String,
-    },
+#[error("{}", first_of(problems))]
+pub struct InitError {
+    problems: Vec<CsvError>,
 }
+
+/// Returns the first problems, a line each.
+fn first_of(problems: &[CsvError]) -> String {
+    let shown: Vec<_> = problems.iter().take(PROBLEMS_MAX).map(CsvError::to_string).collect();
+    shown.join("\n")
+}
+
+/// Most problems that are shown.
+const PROBLEMS_MAX: usize = 2;
 
 /// A job file for a CSV file.
 #[derive(Debug)]
@@ -52,25 +42,18 @@ pub struct FirstJob {
     pub understood: Vec<String>,
 }
 
-/// Looks at the CSV file at `path`, and returns a job file that names it `name`.
+/// Looks at the file at `path`, and returns a job file that names it `name`.
 ///
 /// # Errors
-/// If the file cannot be read, or if it has no header or no column that may be one of velocities.
+/// If the file cannot be read, or has no column that may be one of velocities, or more than one.
 pub fn of_csv(path: &Path, name: &str) -> Result<FirstJob, InitError> {
-    let unreadable = |cause| InitError::Unreadable { path: path.to_owned(), cause };
-    let refused = |reason| InitError::NotUnderstood { path: path.to_owned(), reason };
-    let mut file = user_file::open(path).map_err(unreadable)?.take(limits::FILE_BYTES_MAX + 1);
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes).map_err(unreadable)?;
-    if bytes.len() as u64 > limits::FILE_BYTES_MAX {
-        return Err(refused(format!("it is longer than {} bytes", limits::FILE_BYTES_MAX)));
-    }
-    let layout = Layout::of(&bytes).map_err(refused)?;
-    let roles = Roles::of(&layout).map_err(refused)?;
-    let mut understood = layout.described();
+    let refused = |problems| InitError { problems };
+    let table = velocities::understand(path).map_err(refused)?;
+    let roles = Roles::of(&table);
+    let measured = velocities::of_table(path, &table, &roles.named()).map_err(refused)?;
+    let mut understood = vec![table.described()];
+    understood.extend(measured.account.described(table.missing()));
     understood.extend(roles.described());
-    Ok(FirstJob {
-        text: template::of_data(&template::data_section(name, &layout, &roles)),
-        understood,
-    })
+    let data = template::data_section(name, &table, &roles);
+    Ok(FirstJob { text: template::of_data(&data), understood })
 }

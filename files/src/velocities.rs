@@ -1,56 +1,67 @@
-//! Measured velocities from a CSV file.
+//! Measured velocities from a file.
 //!
-//! The first line that is neither empty nor a comment (`#`) names the columns; `velocity` (m/s) is
-//! one of them, unless the job file says otherwise; others may name the group and the subject of each
-//! velocity; all further columns are ignored. Fields may be quoted, but contain no line break.
+//! There is one reader, for `osteon init` and for jobs, in steps: the bytes and what kind of file they are
+//! ([`opening`]), their text ([`encodings`]), its lines ([`text_lines`]), where the table begins and what
+//! separates its fields ([`header`]), which column has the velocities and how they are written ([`choice`]),
+//! which rows are none ([`lines`], [`summaries`]), the rows themselves ([`columns`]), and what was taken
+//! ([`account`]). What no key says is found out for `osteon init`; for a job it is as documented.
 
+mod account;
+mod choice;
+mod collected;
 mod columns;
+mod content;
 mod csv_format;
+mod encodings;
 mod fields;
+mod file_kind;
+mod hdf5;
+mod header;
+mod lines;
+mod matlab;
+mod names;
+mod number;
+mod opening;
 mod problem;
+mod statistics;
+mod summaries;
+mod table;
 mod text_lines;
+mod units;
+mod workbook;
 
-use std::collections::BTreeMap;
-use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 use osteon_common::check::VELOCITIES_MIN;
 use osteon_common::job::Group;
-use osteon_common::known_quantities::KnownQuantities;
-use osteon_common::origin::Origin;
-use osteon_common::parameters::Parameter;
-use osteon_common::{limits, visible};
+use osteon_common::visible;
 use thiserror::Error;
 
-use self::columns::{Columns, CsvLine, Row};
+use self::collected::CollectedVelocities;
+use self::columns::Columns;
+use self::lines::{TableLine, TableLines};
 use self::problem::{LocatedProblem, Problem, shortened};
-use self::text_lines::LineReader;
 
-pub(crate) use self::columns::{NamedColumns, is_like_subject, is_like_velocity};
+pub(crate) use self::collected::Measured;
+pub(crate) use self::columns::{NamedColumns, is_like_subject};
 pub(crate) use self::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
-pub(crate) use self::fields::csv_fields;
+pub(crate) use self::table::VelocityTable;
 
 /// Maximum number of bad lines that are reported individually.
 const REPORTED_MAX: usize = 10;
-/// A column that seems to name subjects is an index of the rows if it has more names than this.
-const UNUSED_NAMES_MAX: usize = 10_000;
 
-/// Measured velocities of a file, one set or a set for each group.
-#[derive(Debug)]
-pub(crate) struct Measured<T> {
-    /// The velocities, m/s.
-    pub(crate) data: T,
-    /// Their positions in the file.
-    pub(crate) origin: Origin,
-}
+/// Most lines below a table that are none of its rows.
+const BELOW_MAX: usize = 1000;
 
-/// One error in a CSV file of velocities.
+/// One error in a file of velocities.
 #[derive(Debug, Error)]
-#[error("{}{}: {problem}", visible::path(path), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
+#[error("{}{}: {problem}{cure}", visible::path(path), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
 pub(crate) struct CsvError {
     path: PathBuf,
     line: Option<usize>,
     problem: Problem,
+    /// Keys that read the file, at the end of a message; empty if there is no need for them, or none are known.
+    cure: String,
 }
 
 impl CsvError {
@@ -58,9 +69,22 @@ impl CsvError {
     pub(crate) fn stands_for_more(&self) -> bool {
         matches!(self.problem, Problem::More)
     }
+
+    fn located(path: &Path, (line, problem): LocatedProblem) -> Self {
+        Self { path: path.to_owned(), line, problem, cure: String::new() }
+    }
 }
 
-/// Returns the velocities of the CSV file at `path`, m/s, in the file's order: in groups by the names
+/// Returns the table in the file at `path`, with what no key says found out.
+///
+/// # Errors
+/// If it is none, or can be read in several ways.
+pub(crate) fn understand(path: &Path) -> Result<VelocityTable, Vec<CsvError>> {
+    let format = CsvFormat { is_found_out: true, ..CsvFormat::default() };
+    VelocityTable::open(path, &format).map_err(|problem| vec![CsvError::located(path, problem)])
+}
+
+/// Returns the velocities of the file at `path`, m/s, in the file's order: in groups by the names
 /// in the column of groups, in the order of their first occurrence; without such a column, all in one
 /// group without a name.
 ///
@@ -71,10 +95,36 @@ pub(crate) fn read(
     named: &NamedColumns<'_>,
     format: &CsvFormat,
 ) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
-    let located = |(line, problem)| CsvError { path: path.to_owned(), line, problem };
-    let (gathered, columns) = text_lines::open(path, format.encoding)
-        .map_err(|problem| vec![(None, problem)])
-        .and_then(|file| parse(file, named, format))
+    let table = VelocityTable::open(path, format).map_err(|problem| {
+        vec![CsvError { cure: cure(path, format, &problem.1), ..CsvError::located(path, problem) }]
+    })?;
+    let header = table.header_line();
+    let read = of_table(path, &table, named);
+    // The file is read once more for a cure, and should be in memory once.
+    drop(table);
+    read.map_err(|mut errors| {
+        // Other columns that are missing are in no other reading, either.
+        if let Some(first) = errors.first_mut().filter(|first| first.line > Some(header)) {
+            first.cure = cure(path, format, &first.problem);
+        }
+        errors
+    })
+}
+
+/// Returns the velocities of a table in the file at `path`; for the rest see [`read`].
+///
+/// # Errors
+/// Those of the rows.
+pub(crate) fn of_table(
+    path: &Path,
+    table: &VelocityTable,
+    named: &NamedColumns<'_>,
+) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
+    let located = |problem| CsvError::located(path, problem);
+    let header = Some(table.header_line()).filter(|&line| line > 0);
+    let columns =
+        Columns::of_table(table, named).map_err(|problem| vec![located((header, problem))])?;
+    let gathered = gather(table, &columns, named)
         .map_err(|problems| problems.into_iter().map(located).collect::<Vec<_>>())?;
     let measured = gathered.finish(path, &columns);
     if let Some(column) = named.group.first()
@@ -86,190 +136,119 @@ pub(crate) fn read(
     Ok(measured)
 }
 
-fn parse(
-    file: impl BufRead,
+/// Gathers the velocities of the rows.
+fn gather(
+    table: &VelocityTable,
+    columns: &Columns<'_>,
     named: &NamedColumns<'_>,
-    format: &CsvFormat,
-) -> Result<(CollectedVelocities, Columns), Vec<LocatedProblem>> {
-    let mut lines = LineReader::new(file);
-    let columns = columns(&mut lines, named, format).map_err(|problem| vec![problem])?;
-    let mut gathered =
-        CollectedVelocities { has_subjects: named.subject.is_some(), ..Default::default() };
-    let mut problems = Vec::new();
-    loop {
-        match lines.next() {
-            Ok(None) => break,
-            Ok(Some((number, line))) => match columns.row(line) {
-                Ok(CsvLine::Blank) => {}
-                Ok(CsvLine::Missing) => gathered.left_out += 1,
-                Ok(CsvLine::Row(row)) => match gathered.contradiction(&row, &columns) {
-                    Some(problem) => problems.push((Some(number), problem)),
-                    None => gathered.add(number, row).map_err(|problem| vec![(None, problem)])?,
-                },
-                Err(problem) => problems.push((Some(number), problem)),
-            },
-            // After this error, the rest of the file cannot be interpreted.
-            Err(problem) => {
-                problems.push(problem);
-                return Err(problems);
+) -> Result<CollectedVelocities, Vec<LocatedProblem>> {
+    let gathered = CollectedVelocities::new(named.subject.is_some(), table);
+    let mut reading =
+        RowReading { table, columns, gathered, problems: Vec::new(), below: Vec::new() };
+    for line in TableLines::of(&table.content.text, &table.header, Some(table.place())) {
+        let read =
+            line.map_err(|(line, problem)| (line, problem, true)).and_then(|(number, line)| {
+                reading.line(number, line).map_err(|problem| {
+                    let is_final = problem.is_final();
+                    (Some(number).filter(|_| !is_final), problem, is_final)
+                })
+            });
+        if let Err((line, problem, is_final)) = read {
+            reading.problems.push((line, problem));
+            // After this error, the rest of the file cannot be interpreted, or no later row can mend it.
+            if is_final {
+                return Err(reading.problems);
             }
         }
-        if problems.len() > REPORTED_MAX {
-            problems.pop();
-            problems.push((None, Problem::More));
-            return Err(problems);
+        if reading.problems.len() > REPORTED_MAX {
+            reading.problems.truncate(REPORTED_MAX);
+            reading.problems.push((None, Problem::More));
+            return Err(reading.problems);
         }
     }
-    if problems.is_empty() && gathered.count < VELOCITIES_MIN {
-        problems.push((None, if gathered.count == 0 { Problem::NoRows } else { Problem::OneRow }));
-    }
-    if problems.is_empty() { Ok((gathered, columns)) } else { Err(problems) }
+    reading.finish()
 }
 
-/// Reads the header, and a line above it that names the separator.
-fn columns(
-    lines: &mut LineReader<impl BufRead>,
-    named: &NamedColumns<'_>,
-    format: &CsvFormat,
-) -> Result<Columns, LocatedProblem> {
-    let mut above = None;
-    // At most one line is above the header.
-    for _ in 0..2 {
-        let (number, line) = lines.next()?.ok_or((None, Problem::Empty))?;
-        if above.is_none() {
-            above = Separator::of_first_line(line);
-            if above.is_some() {
-                continue;
+/// The rows of a table while they are read.
+struct RowReading<'a> {
+    table: &'a VelocityTable,
+    columns: &'a Columns<'a>,
+    gathered: CollectedVelocities,
+    problems: Vec<LocatedProblem>,
+    /// Lines that seem to stand below the table; if a velocity follows, they are wrong rows.
+    below: Vec<(usize, Vec<String>)>,
+}
+
+impl RowReading<'_> {
+    fn line(&mut self, number: usize, line: TableLine) -> Result<(), Problem> {
+        let account = &mut self.gathered.account;
+        let fields = match line {
+            TableLine::Rule => return Ok(()),
+            TableLine::OpenQuote => return Err(Problem::Quote),
+            TableLine::Units(_) => {
+                account.leave_out(number, "(units)");
+                return Ok(());
             }
-        }
-        return Columns::from_header(line, above, named, format)
-            .map_err(|problem| (Some(number), problem));
-    }
-    Err((None, Problem::Empty))
-}
-
-/// The velocities read so far.
-#[derive(Default)]
-struct CollectedVelocities {
-    groups: Vec<CollectedGroup>,
-    /// Position of each group, by its name.
-    places: BTreeMap<String, usize>,
-    count: usize,
-    /// Number of rows with a value that is missing.
-    left_out: u32,
-    /// Whether a column of subjects is named.
-    has_subjects: bool,
-    /// Number of subjects in all groups.
-    subjects: usize,
-    /// Whether the column that seems to name subjects has too many names for that.
-    is_index: bool,
-}
-
-/// The velocities of one group.
-struct CollectedGroup {
-    name: String,
-    velocities: Vec<f64>,
-    /// Line of each velocity, from 1.
-    lines: Vec<u32>,
-    /// Number of the subject of each velocity; empty if there is no such column.
-    subjects: Vec<u32>,
-    /// Numbers of the subjects, by their names.
-    numbers: BTreeMap<String, u32>,
-    /// Decay of each velocity; empty if there is no such column.
-    decays: Vec<f64>,
-    /// Quantities that are known of the group.
-    known: [Option<f64>; Parameter::OF_SETUP.len()],
-}
-
-impl CollectedVelocities {
-    /// Returns how a row contradicts what is known of its group from the first of its rows.
-    fn contradiction(&self, row: &Row, columns: &Columns) -> Option<Problem> {
-        let group = &self.groups[*self.places.get(&row.group)?];
-        let pairs = group.known.iter().zip(row.known).enumerate();
-        let mut different = pairs.filter_map(|(quantity, (first, found))| {
-            let (first, found) = ((*first)?, found?);
-            (first.to_bits() != found.to_bits()).then_some((quantity, first, found))
-        });
-        let (quantity, first, found) = different.next()?;
-        Some(Problem::OtherKnownValue {
-            column: shortened(columns.known(quantity)),
-            found,
-            first,
-            line: group.lines.first().copied().unwrap_or_default(),
-            group: shortened(&row.group),
-        })
-    }
-
-    fn add(&mut self, line: usize, row: Row) -> Result<(), Problem> {
-        self.count += 1;
-        if self.count > limits::DATA_VELOCITIES_MAX {
-            return Err(Problem::TooMany);
-        }
-        if self.has_subjects && self.count > limits::DATA_SUBJECTS_MAX {
-            return Err(Problem::TooManySubjects);
-        }
-        let place = match self.places.get(&row.group) {
-            Some(&place) => place,
-            None if self.groups.len() == limits::GROUPS_MAX => return Err(Problem::TooManyGroups),
-            None => {
-                self.groups.push(CollectedGroup::new(row.group.clone(), row.known));
-                self.places.insert(row.group, self.groups.len() - 1);
-                self.groups.len() - 1
+            TableLine::RepeatedHeader => {
+                account.leave_out(number, "(the header again)");
+                return Ok(());
             }
+            TableLine::OtherShape(fields)
+            | TableLine::Labelled { fields, .. }
+            | TableLine::Data(fields) => fields,
         };
-        let group = &mut self.groups[place];
-        group.velocities.push(row.velocity);
-        group.decays.extend(row.decay);
-        // The limit on a file's bytes keeps the number of lines far below this.
-        group.lines.push(u32::try_from(line).unwrap_or(u32::MAX));
-        if let Some(subject) = row.subject.filter(|_| !self.is_index) {
-            self.subjects += usize::from(group.add_subject(subject));
-            self.is_index = !self.has_subjects && self.subjects > UNUSED_NAMES_MAX;
+        if let Some(shown) = self.table.summaries.get(&number) {
+            account.leave_out(number, shown);
+            return Ok(());
+        }
+        if fields.len() == self.table.names().len() {
+            if self.gathered.row(number, fields, self.columns)? {
+                let below = self.below.drain(..);
+                self.problems.extend(
+                    below.map(|(line, fields)| (Some(line), wrong_shape(self.table, &fields))),
+                );
+            }
+            return Ok(());
+        }
+        match self.table.is_below(&fields) && self.below.len() < BELOW_MAX {
+            true => self.below.push((number, fields)),
+            false => return Err(wrong_shape(self.table, &fields)),
         }
         Ok(())
     }
 
-    /// Returns the groups and what is known of their rows.
-    fn finish(self, path: &Path, columns: &Columns) -> Measured<Vec<Group>> {
-        let repeats = !self.is_index && self.groups.iter().any(CollectedGroup::repeats);
-        let unused = columns.like_subjects().filter(|_| repeats);
-        let origin = Origin {
-            path: path.to_owned(),
-            unused_subjects: unused.map(shortened),
-            left_out: self.left_out,
-            lines: Vec::with_capacity(self.groups.len()),
-        };
-        let mut measured = Measured { data: Vec::with_capacity(self.groups.len()), origin };
-        for CollectedGroup { name, velocities, lines, subjects, decays, known, .. } in self.groups {
-            let subjects = self.has_subjects.then_some(subjects);
-            let known = KnownQuantities::new(known);
-            // Rows have a decay each, or none has.
-            let decays = (!decays.is_empty()).then_some(decays);
-            measured.data.push(Group { name, velocities, subjects, decays, known });
-            measured.origin.lines.push(lines);
+    fn finish(mut self) -> Result<CollectedVelocities, Vec<LocatedProblem>> {
+        for (line, fields) in self.below {
+            let text = fields.iter().find(|field| !field.is_empty()).map_or("", String::as_str);
+            self.gathered.account.leave_out(line, &format!("{:?}", shortened(text)));
         }
-        measured
+        let count = self.gathered.count;
+        if self.problems.is_empty() && count < VELOCITIES_MIN {
+            self.problems.push((None, if count == 0 { Problem::NoRows } else { Problem::OneRow }));
+        }
+        if self.problems.is_empty() { Ok(self.gathered) } else { Err(self.problems) }
     }
 }
 
-impl CollectedGroup {
-    fn new(name: String, known: [Option<f64>; Parameter::OF_SETUP.len()]) -> Self {
-        let (velocities, lines, subjects) = (Vec::new(), Vec::new(), Vec::new());
-        let (decays, numbers) = (Vec::new(), BTreeMap::new());
-        Self { name, velocities, lines, subjects, decays, numbers, known }
-    }
+fn wrong_shape(table: &VelocityTable, fields: &[String]) -> Problem {
+    Problem::FieldCount { found: fields.len(), expected: table.names().len() }
+}
 
-    /// Adds the subject of a velocity; returns whether it is a new one.
-    fn add_subject(&mut self, name: String) -> bool {
-        // At most as many as there are velocities.
-        let next = u32::try_from(self.numbers.len()).unwrap_or(u32::MAX);
-        let number = *self.numbers.entry(name).or_insert(next);
-        self.subjects.push(number);
-        number == next
+/// Returns the keys that read a file which a job does not, at the end of a message.
+fn cure(path: &Path, format: &CsvFormat, problem: &Problem) -> String {
+    if format.is_found_out || !problem.may_be_of_format() {
+        return String::new();
     }
-
-    /// Returns whether there are several subjects, of which some have several velocities.
-    fn repeats(&self) -> bool {
-        (2..self.subjects.len()).contains(&self.numbers.len())
+    let open = CsvFormat { is_found_out: true, ..format.clone() };
+    let Ok(table) = VelocityTable::open(path, &open) else { return String::new() };
+    let keys: Vec<String> = table
+        .keys()
+        .into_iter()
+        .filter(|(key, _)| !format.has(key))
+        .map(|(key, value)| format!("{key} = {value}"))
+        .collect();
+    match keys.is_empty() {
+        true => String::new(),
+        false => format!("; this reads it: [data] {}", keys.join(", ")),
     }
 }

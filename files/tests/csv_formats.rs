@@ -39,6 +39,11 @@ fn files_as_people_have_them_are_read() {
         (utf16(&with_mark, u16::to_be_bytes), ""),
         (utf16(plain, u16::to_le_bytes), "encoding = \"utf-16le\""),
         (b"Gr\xf6\xdfe,velocity\nM\xfcller,3900.5\nx,4000\n".to_vec(), "encoding = \"latin1\""),
+        (b"Device,X1\nvelocity,x\n3900.5,1\n4000,2\n".to_vec(), "skip_lines = 1"),
+        (b"velocity\n1\n\nvelocity,x\n3900.5,1\n4000,2\n".to_vec(), "header_line = 4"),
+        (b"1,3900.5\n2,4000\n".to_vec(), "header_line = 0\ncolumn = \"2\""),
+        (b"id velocity\n 1   3900.5\n 2   4000\n".to_vec(), "separator = \"space\""),
+        (b"the id  velocity\n1  3900.5\n2  4000\n".to_vec(), "separator = \"spaces\""),
         (with_mark.clone().into_bytes(), "encoding = \"windows-1252\""),
     ] {
         let shown = String::from_utf8_lossy(&bytes);
@@ -82,7 +87,7 @@ fn a_refusal_names_the_key_that_reads_the_file() {
         let message = read_as(bytes, more).unwrap_err();
         assert!(message.contains(expected), "{message}");
     };
-    check(b"a;velocity\n1;3900\n", "", "if its fields are separated so: [data] separator = \";\"");
+    check(b"a;velocity\n1;3900\n", "", "this reads it: [data] separator = \";\"");
     check(b"a\tvelocity\n1\t3900\n", "", "[data] separator = \"tab\"");
     check(b"a;velocity\n1;3900,5\n", "separator = \";\"", "[data] decimal = \",\"");
     check(b"a,FAS Velocity\n1,3900\n", "", "[data] column = \"FAS Velocity\"");
@@ -93,7 +98,7 @@ fn a_refusal_names_the_key_that_reads_the_file() {
         "",
         "[data] encoding = \"windows-1252\" (Western Europe, Latin-1), \"utf-16le\"",
     );
-    check(b"velocity\n3900,5\n", "", "quote them, or separate fields by semicolons");
+    check(b"velocity\n3900,5\n", "", "this reads it: [data] separator = \";\", decimal = \",\"");
     let ok = b"velocity\n3900\n3910\n";
     check(
         ok,
@@ -116,5 +121,8 @@ fn a_refusal_names_the_key_that_reads_the_file() {
         "missing = \"NA\"",
         "data.missing: is the string \"NA\"; it must be a list of at most 20 texts",
     );
+    check(ok, "skip_lines = -1", "data.skip_lines: is -1; it must be");
+    check(ok, "header_line = 1.5", "data.header_line: is 1.5; it must be");
+    check(ok, "skip_lines = 1\nheader_line = 2", "leave one of them out");
     check(ok, "column = \"v\"", "no column `v`; the header has `velocity`");
 }

@@ -56,7 +56,7 @@ fn files_as_people_have_them_are_understood() {
     check(
         &plain,
         &[],
-        "12 rows of 1 column: decimal points\n12 velocities in the column \"velocity\"",
+        "header in line 1, decimal points\n12 velocities from line 2 to 13, column 1 \"velocity\"",
     );
     let marked =
         [b"\xef\xbb\xbf".to_vec(), file("velocity", "\r\n", |_, v| v.to_string())].concat();
@@ -97,7 +97,7 @@ fn files_as_people_have_them_are_understood() {
     let keys = ["missing = [\"\", \"-\", \"-999\", \"0\", \"NA\"]"];
     check(&gaps, &keys, "5 rows are left out: the velocity is \"\" or \"-\" or");
     let units = file("velocity,n\nm/s,1", "\n", |i, v| format!("{v},{i}"));
-    check(&units, &["missing = [\"m/s\"]"], "1 row is left out");
+    check(&units, &[], "1 row left out: line 2 (units)");
     let quoted = file("\"\",\"velocity\"", "\n", |i, v| format!("\"{i}\",\"{}\"", german(v)));
     check(&quoted, &["decimal = \",\""], "fields separated by commas, decimal commas");
     let latin: Vec<u8> =
@@ -115,10 +115,10 @@ fn what_is_not_understood_is_said() {
         let message = understood(text.as_bytes()).unwrap_err();
         assert!(message.contains(expected), "{message}");
     };
-    check("", "CSV: it is empty; it must have a line with the names of the columns");
+    check("", "CSV: has no header; its first line must name the columns");
     check(
         "3900\n3910\n",
-        "its first line has only numbers; write the names of the columns above it",
+        "line 1: begins with numbers, and no line above names the columns: write the names above them",
     );
     check(
         "a,b\nx,y\nz,w\n",
@@ -129,7 +129,10 @@ fn what_is_not_understood_is_said() {
         "velocity\n39\n40\n41\n",
         "the median of the column `velocity` is 40; velocities of bone are",
     );
-    check("velocity\n3900\nNA\nNA\n", "no column is clearly");
+    check(
+        "velocity\n3900\nNA\nNA\n",
+        "line 3: the column `velocity` has \"NA\", which is no number",
+    );
 }
 
 #[test]

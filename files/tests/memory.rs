@@ -119,7 +119,7 @@ fn reading_takes_no_more_memory_than_a_job_needs() {
     let (accepted, taken) = read(directory.path(), "job.toml", &job(&list));
     assert_eq!(accepted, Ok(()));
     assert!(taken < 448 * MIB, "{} MiB of memory", taken / MIB);
-    // In a CSV file: a line, and the numbers.
+    // In a CSV file: its text as a whole, as the table in it is looked for, and the numbers.
     let longest = usize::try_from(FILE_BYTES_MAX).unwrap();
     let column = "x".repeat(40);
     let rows = million().fold(format!("velocity,{column}\n"), |mut text, velocity| {
@@ -142,6 +142,6 @@ fn reading_takes_no_more_memory_than_a_job_needs() {
             (Err(message), Err(expected)) => assert!(message.contains(expected), "{message:.300}"),
             (read, expected) => panic!("{expected:?}: {read:?}"),
         }
-        assert!(taken < 20 * MIB, "{expected:?}: {} MiB of memory", taken / MIB);
+        assert!(taken < longest + 40 * MIB, "{expected:?}: {} MiB of memory", taken / MIB);
     }
 }

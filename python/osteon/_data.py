@@ -72,7 +72,10 @@ def one_list(velocities: Any) -> Any:
     """Velocities that are no frame: an array of one axis, or a path."""
     if hasattr(velocities, "__fspath__"):
         return velocities
-    array = np.asarray(velocities)
+    if hasattr(velocities, "__next__"):
+        refuse("data.velocities", "is an iterator; give a list of it: list(…)")
+    velocities = in_si(velocities, "data.velocities")
+    array = np.asarray(unmasked(velocities, "data.velocities"))
     if array.ndim != 1:
         refuse("data.velocities", f"has {array.ndim} axes; it must be a list of velocities (m/s)")
     if array.size == 0:
@@ -89,7 +92,11 @@ def column(frame: Any, name: object, field: str) -> np.ndarray[Any, Any]:
         near = difflib.get_close_matches(str(name), names, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"the columns are: {', '.join(names)}"
         refuse(field, f"the frame has no column {name!r}; {hint}")
-    return np.asarray(frame[name].to_numpy())
+    found = frame[name]
+    dtype = str(getattr(found, "dtype", ""))
+    if dtype.startswith("pint["):
+        refuse(field, f"the column {name!r} has the unit {dtype[5:-1]}; give its numbers in SI units")
+    return np.asarray(unmasked(found.to_numpy(), field))
 
 
 def from_frame(frame: Any, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -149,6 +156,10 @@ def by_group(
 
 def numbers(values: np.ndarray[Any, Any], name: object) -> np.ndarray[Any, Any]:
     """A column of finite numbers."""
+    # NumPy makes numbers of texts, durations and truth values, too, and drops imaginary parts.
+    entries = values.tolist() if values.dtype.kind == "O" else []
+    if values.dtype.kind not in "fiuO" or any(is_no_number(entry) for entry in entries):
+        refuse("data.velocities", f"the column {name!r} has values that are no numbers")
     try:
         found = values.astype(np.float64)
     except (TypeError, ValueError):
@@ -159,6 +170,39 @@ def numbers(values: np.ndarray[Any, Any], name: object) -> np.ndarray[Any, Any]:
         message = f"the column {name!r} is {found[wrong[0]]} in row {wrong[0]}{more}; "
         refuse("data.velocities", message + "leave such rows out (frame.dropna())")
     return found
+
+
+def is_no_number(entry: object) -> bool:
+    """Whether this is something of which NumPy would make a number without being asked."""
+    return isinstance(entry, (str, bytes, bool, np.bool_, complex, np.datetime64, np.timedelta64))
+
+
+def unmasked(values: Any, field: str) -> Any:
+    """The values; refused if some are masked, because what is behind a mask is no value."""
+    if np.ma.isMaskedArray(values):
+        count = int(np.ma.getmaskarray(values).sum())
+        if count > 0:
+            refuse(field, f"has {count} masked values; leave them out (array.compressed())")
+        return values.data
+    return values
+
+
+def in_si(values: Any, field: str) -> Any:
+    """The numbers of velocities that carry a unit, in m/s; others as they are."""
+    unit = getattr(values, "units", getattr(values, "unit", None))
+    if unit is None and isinstance(getattr(values, "attrs", None), Mapping):
+        unit = values.attrs.get("units")
+        if unit is not None and str(unit) not in ("m/s", "m s-1", "m s^-1", "m s**-1", "meter / second"):
+            refuse(field, f"has the unit {unit}; give it in m/s")
+        return values
+    if unit is None or not hasattr(values, "to"):
+        return values
+    try:
+        converted = values.to("m/s")
+    # Every library of units has its own exception for units of something else.
+    except Exception as error:
+        refuse(field, f"has the unit {unit}, which is none of velocities: {error}")
+    return getattr(converted, "magnitude", getattr(converted, "value", converted))
 
 
 def present(values: np.ndarray[Any, Any], name: object, field: str) -> None:

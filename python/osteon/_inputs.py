@@ -51,7 +51,11 @@ def plain(value: Any, field: str) -> Any:
         return number
     if isinstance(value, os.PathLike):
         return os.fspath(value)
+    if np.ma.isMaskedArray(value) and np.ma.getmaskarray(value).any():
+        refuse(field, "has masked values; leave them out (array.compressed())")
     if isinstance(value, np.ndarray):
+        if hasattr(value, "unit") or hasattr(value, "units"):
+            refuse(field, "carries a unit; give its numbers in SI units")
         return array(value, field)
     if isinstance(value, Mapping):
         return {str(key): plain(entry, entry_path(field, key)) for key, entry in value.items()}

@@ -124,6 +124,15 @@ class Job:
             job._has_data = False
         return job
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Files that the job names need not be there where it is copied to: all of it goes along.
+        for kind in ("identification", "propagation"):
+            try:
+                self._check(kind)
+            except InputError:
+                continue
+        return dict(self.__dict__)
+
     def _warn(self, checked: _native.CheckedJob) -> None:
         for warning in checked.warnings:
             warnings.warn(warning, OsteonWarning, stacklevel=3)

@@ -21,6 +21,9 @@ pub(crate) struct PyJob {
     specification: JobSpecification,
 }
 
+/// A function that makes a job again, and its arguments: text, format, directory, kind.
+type Reduced<'py> = (Bound<'py, PyAny>, (String, &'static str, &'static str, &'static str));
+
 #[pymethods]
 impl PyJob {
     /// Reads and checks a job file.
@@ -86,6 +89,14 @@ impl PyJob {
             .ensemble(&specification.start())
             .map_err(|error| errors::bad_input("parameters", error.to_string()))?;
         Ok(PyEnsemble::of_job(ensemble))
+    }
+
+    /// Copies and pickles it as its complete job file.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let specification = &slf.get().specification;
+        let text = job_file::to_toml(specification);
+        let kind = specification.kind.name();
+        Ok((slf.get_type().getattr("parse")?, (text, "toml", "", kind)))
     }
 
     fn __eq__(&self, other: &Self) -> bool {

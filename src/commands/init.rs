@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf, absolute};
 use anyhow::{Context as _, anyhow};
 use osteon_common::job::JobKind;
 use osteon_common::visible;
+use osteon_files::document::Format;
 use osteon_files::init::FirstJob;
 use osteon_files::{init, job_file};
 
@@ -40,6 +41,14 @@ pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFail
     let mut stdout = output::stdout(OutputFormat::Text);
     if is_printed {
         stdout.verbatim(&first.text).map_err(stdout_failure)?;
+        // What is wrong with the values themselves is said of a printed job, too.
+        if velocities.is_some() {
+            let (kind, here) = (JobKind::Identification, Path::new(""));
+            let job = job_file::parse(&first.text, Format::Toml, here, kind);
+            job.map_err(|error| {
+                CommandFailure::bad_input(anyhow!(error).context("the job cannot be run yet"))
+            })?;
+        }
         return Ok(ExitStatus::Done);
     }
     new_files::create(&[NewFile { path: path.clone(), text: first.text.into(), secret: false }])?;

@@ -1,8 +1,10 @@
 //! `simulate`: one deterministic case.
 
 use std::io::{self, Write};
+use std::time::Duration;
 
-use osteon_common::case::Case;
+use osteon_common::case::{Case, Setup};
+use osteon_common::sampling::NominalSampling;
 use osteon_common::warnings::case_warnings;
 use osteon_files::case_file;
 use osteon_solver::check::Check;
@@ -10,13 +12,20 @@ use osteon_solver::{
     Arrival, FirstSignal, GuidedWaves, Isa, Solver, TraceError, Traces, Workspace,
 };
 
+use tokio::task::JoinHandle;
+
 use crate::arguments::SimulateArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output::{self, ShownSimulation};
+use crate::progress::say;
 use crate::report_directory;
 use crate::resolved;
 use crate::simulation_directory::{SimulationKey, TRACES};
 use crate::warnings;
+
+/// Time without a word, at first and later.
+const FIRST_WORD: Duration = Duration::from_secs(5);
+const LATER_WORDS: Duration = Duration::from_secs(60);
 
 /// Solves the case, writes its files if requested, and prints the result.
 pub(super) async fn simulate(
@@ -31,7 +40,7 @@ pub(super) async fn simulate(
     let setup = case.setup;
     let reported = arguments.out.clone().filter(|_| arguments.report);
     let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments, isa));
-    let solved = solved.await.map_err(CommandFailure::failed)??;
+    let solved = said_while(solved, &setup).await.map_err(CommandFailure::failed)??;
     let shown = ShownSimulation {
         setup: &setup,
         arrival: &solved.arrival,
@@ -46,6 +55,33 @@ pub(super) async fn simulate(
     }
     let passed = solved.check.as_ref().is_none_or(Check::passed);
     Ok(if passed && solved.arrival.is_ok() { ExitStatus::Done } else { ExitStatus::RunFailed })
+}
+
+/// Waits for a computation, and says now and then that it goes on, and how large it is.
+async fn said_while<T>(
+    computation: JoinHandle<T>,
+    setup: &Setup,
+) -> Result<T, tokio::task::JoinError> {
+    let mut computation = computation;
+    let mut waited = FIRST_WORD;
+    let mut next = FIRST_WORD;
+    loop {
+        match tokio::time::timeout(next, &mut computation).await {
+            Ok(solved) => return solved,
+            Err(_) => {
+                let size =
+                    NominalSampling::from_setup(setup).map_or_else(String::new, |sampling| {
+                        format!(
+                            ": its sampling has {} pairs of frequency and wavenumber",
+                            sampling.pairs
+                        )
+                    });
+                say(&format!("still computing after {} s{size}", waited.as_secs()));
+                next = LATER_WORDS;
+                waited += LATER_WORDS;
+            }
+        }
+    }
 }
 
 struct SolvedCase {

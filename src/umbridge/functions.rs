@@ -138,6 +138,7 @@ impl ServedJob {
                 Ok(ModelValue { output: vec![velocity], notes: Vec::new() })
             }
             ServedModel::Posterior => {
+                space.check_units(input)?;
                 let density = self.density(&space, config).await?;
                 let outside = || ProtocolError {
                     no_value: true,

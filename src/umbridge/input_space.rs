@@ -6,6 +6,11 @@ use osteon_common::violations::Violations;
 
 use super::protocol_error::ProtocolError;
 
+/// Multiples and positions between bounds that no point of a job's domain has.
+const FARTHEST: f64 = 1000.0;
+/// Values in SI units are of the job if they are within this factor of its own.
+const CLOSE: f64 = 10.0;
+
 /// What the entries of an input are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum InputScale {
@@ -65,6 +70,26 @@ impl<'a> InputSpace<'a> {
             };
         }
         point
+    }
+
+    /// Refuses an input that is in SI units where it should be multiples, or positions between the bounds: that is no
+    /// point outside of the domain, which a sampler may ask for, but a mistake.
+    ///
+    /// # Errors
+    /// If an entry is farther from the job than any, and all are close to it as values in SI units.
+    pub(super) fn check_units(&self, input: &[f64]) -> Result<(), ProtocolError> {
+        let is_far = |given: &f64| given.abs() > FARTHEST;
+        let is_close = |(&parameter, &given): (&Parameter, &f64)| {
+            (1.0 / CLOSE..CLOSE).contains(&(given / self.base.get(parameter)))
+        };
+        let are_close = self.parameters.iter().zip(input).all(is_close);
+        if self.scale == InputScale::Si || !input.iter().any(is_far) || !are_close {
+            return Ok(());
+        }
+        let scale = self.scale.name();
+        Err(ProtocolError::input(format!(
+            "the input is in SI units, and {scale} are meant; give {scale}, or say config.inputs = \"si\""
+        )))
     }
 
     /// Returns the size of each entry of the input, to which steps of differences are relative.
@@ -206,6 +231,24 @@ mod tests {
         assert_eq!(of(InputScale::Bounds).sizes(&[0.0]), [1.0]);
         assert_eq!(of(InputScale::Si).sizes(&[0.05]), [0.05]);
         assert_eq!(of(InputScale::Si).sizes(&[0.0]), [0.1 * 1e-3]);
+    }
+
+    #[test]
+    fn values_in_si_units_are_told_from_points_outside() {
+        let job = job();
+        let base = job.start();
+        let check = |scale, input: &[f64; 2], expected: bool| {
+            let parameters = vec![Parameter::ALL[1], Parameter::Dispersion];
+            let space = InputSpace::new(&job, base, parameters, scale);
+            assert_eq!(space.check_units(input).is_err(), expected, "{scale:?} {input:?}");
+        };
+        check(InputScale::Multiples, &[17.0e9, 0.1], true);
+        check(InputScale::Bounds, &[17.0e9, 0.1], true);
+        check(InputScale::Si, &[17.0e9, 0.1], false);
+        check(InputScale::Multiples, &[1.0, 1.0], false);
+        check(InputScale::Multiples, &[1.0, 0.1], false);
+        check(InputScale::Multiples, &[5.0, -3.0], false);
+        check(InputScale::Multiples, &[1e30, 1.0], false);
     }
 
     #[test]

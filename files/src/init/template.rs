@@ -2,9 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::layout::Layout;
 use super::roles::Roles;
-use crate::velocities::{DecimalMark, VelocityUnit};
+use crate::velocities::VelocityTable;
 
 /// Everything below `[data]`. The parameters but two are fixed, as two moments determine two.
 const BELOW_DATA: &str = r#"
@@ -67,30 +66,14 @@ pub(super) fn of_data(data: &str) -> String {
 }
 
 /// Returns the section of data of a file.
-pub(super) fn data_section(name: &str, layout: &Layout, roles: &Roles) -> String {
+pub(super) fn data_section(name: &str, table: &VelocityTable, roles: &Roles) -> String {
     let mut text = format!("[data]\nvelocities = {}\n", quoted(name));
     let mut key = |name: &str, value: String| {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{name} = {value}");
     };
-    if roles.velocity != "velocity" {
-        key("column", quoted(&roles.velocity));
-    }
-    if roles.unit != VelocityUnit::default() {
-        key("unit", quoted(roles.unit.name()));
-    }
-    if !layout.is_usual_separator {
-        key("separator", quoted(layout.separator.name()));
-    }
-    if layout.decimal != DecimalMark::default() {
-        key("decimal", quoted(layout.decimal.name()));
-    }
-    if let Some(encoding) = layout.encoding_name() {
-        key("encoding", quoted(&encoding));
-    }
-    if !roles.missing.is_empty() {
-        let texts: Vec<_> = roles.missing.iter().map(|text| quoted(text)).collect();
-        key("missing", format!("[{}]", texts.join(", ")));
+    for (name, value) in table.keys() {
+        key(name, value);
     }
     if let Some(group) = &roles.group {
         key("group", quoted(&group.name));

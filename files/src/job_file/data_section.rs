@@ -19,12 +19,13 @@ use crate::velocities::{self, CsvError, CsvFormat, Measured, NamedColumns};
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 
 /// The keys of `[data]`.
-pub(super) const KEYS: [Key; 18] = [
+pub(super) const KEYS: [Key; 20] = [
     Key {
         name: "velocities",
         meaning: "for `identify`: path of a CSV file, relative to the job file's directory, with a \
                   header and a column `velocity` in m/s (other columns, and lines that start with \
-                  `#`, are ignored), or as the next six keys say; or a list of velocities",
+                  `#`, are ignored), or as the next eight keys say; an Excel workbook (`.xlsx`), a file packed by gzip, \
+                  or a MATLAB or HDF5 file; or a list of velocities",
     },
     Key {
         name: "column",
@@ -36,12 +37,14 @@ pub(super) const KEYS: [Key; 18] = [
     },
     Key {
         name: "separator",
-        meaning: "what separates the fields of the file: `\",\"` (default) or `\";\"` or `\"tab\"` or `\"|\"`; \
-                  without the key, a first line such as `sep=;` is obeyed",
+        meaning: "what separates the fields of the file: `\",\"` (default) or `\";\"` or `\"tab\"` or `\"|\"` or \
+                  `\"space\"` (one or more blanks) or `\"spaces\"` (two or more); without the key, a first line \
+                  such as `sep=;` is obeyed",
     },
     Key {
         name: "decimal",
-        meaning: "the decimal mark of the file's numbers: `\".\"` (default) or `\",\"`",
+        meaning: "the decimal mark of the file's numbers: `\".\"` (default) or `\",\"`; marks of thousands are \
+                  read where they are unambiguous",
     },
     Key {
         name: "missing",
@@ -53,6 +56,16 @@ pub(super) const KEYS: [Key; 18] = [
         name: "encoding",
         meaning: "the encoding of the file, by its name on the web, such as `\"windows-1252\"` or \
                   `\"utf-16le\"` (default: UTF-8, or what a byte order mark says)",
+    },
+    Key {
+        name: "skip_lines",
+        meaning: "number of lines above the header that are not looked at, such as an instrument writes them \
+                  (default 0)",
+    },
+    Key {
+        name: "header_line",
+        meaning: "instead: the line of the header, from 1, whatever stands above it; 0 if there is no header, \
+                  and then the columns are named by their numbers: `\"1\"`, `\"2\"`, …",
     },
     Key {
         name: "group",
@@ -305,7 +318,8 @@ const OF_A_FILE: [(&str, &str); 4] = [
     ),
 ];
 /// Keys that say how a file of velocities is written.
-const FORMAT_KEYS: [&str; 6] = ["column", "unit", "separator", "decimal", "missing", "encoding"];
+const FORMAT_KEYS: [&str; 8] =
+    ["column", "unit", "separator", "decimal", "missing", "encoding", "skip_lines", "header_line"];
 /// Keys that belong to a list of velocities, and what is wrong with each beside a file.
 const OF_A_LIST: [(&str, &str); 2] = [
     (
@@ -428,7 +442,7 @@ fn from_file(
     named: &NamedColumns<'_>,
     format: &CsvFormat,
 ) -> Result<(Measurements, Origin), Vec<CsvError>> {
-    let Measured { data: mut groups, origin } = velocities::read(path, named, format)?;
+    let Measured { data: mut groups, origin, .. } = velocities::read(path, named, format)?;
     let measurements = match (named.group.is_empty(), groups.pop()) {
         // Without a column of groups all velocities are in one.
         (true, Some(Group { velocities, subjects, decays, .. })) => {

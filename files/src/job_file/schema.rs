@@ -9,7 +9,7 @@ use serde_json::{Map, Value as Json, json};
 
 use crate::materials;
 
-use super::csv_format::MISSING_MAX;
+use super::csv_format::{LINES, MISSING_MAX};
 use super::data_section::GROUP_COLUMNS_MAX;
 use super::{data_section, parameters, posterior, priors};
 use crate::velocities::{DecimalMark, Separator, VelocityUnit};
@@ -135,6 +135,7 @@ fn data() -> Json {
     let texts = |most: usize| json!({ "type": "array", "items": name(), "maxItems": most });
     let mut group_columns = texts(GROUP_COLUMNS_MAX);
     group_columns["minItems"] = 1.into();
+    let lines = || json!({ "type": "integer", "minimum": LINES.min, "maximum": LINES.max });
     // In the order of the keys.
     let types: [Json; data_section::KEYS.len()] = [
         json!({ "anyOf": [name(), list()] }),
@@ -144,6 +145,8 @@ fn data() -> Json {
         choice(&DecimalMark::default()),
         texts(MISSING_MAX),
         name(),
+        lines(),
+        lines(),
         json!({ "anyOf": [name(), group_columns] }),
         name(),
         name(),

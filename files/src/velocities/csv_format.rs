@@ -3,20 +3,41 @@
 use encoding_rs::Encoding;
 use osteon_common::fields::Choice;
 
-/// How a file is written. The default is that of files that need no further word: UTF-8, commas,
-/// decimal points, the column `velocity` in m/s.
+/// How a file is written, as far as keys say it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CsvFormat {
-    /// The separator of fields; `None` for that of a first line `sep=…`, or else a comma.
     pub(crate) separator: Option<Separator>,
-    pub(crate) decimal: DecimalMark,
-    /// Name of the column of velocities, if it is not `velocity`.
+    pub(crate) decimal: Option<DecimalMark>,
+    /// Name of the column of velocities.
     pub(crate) column: Option<String>,
-    pub(crate) unit: VelocityUnit,
+    pub(crate) unit: Option<VelocityUnit>,
     /// Texts that stand for a value that is missing; a row with one of them is left out.
-    pub(crate) missing: Vec<String>,
-    /// The encoding; `None` for UTF-8. A byte order mark takes precedence.
+    pub(crate) missing: Option<Vec<String>>,
+    /// The encoding. A byte order mark takes precedence.
     pub(crate) encoding: Option<&'static Encoding>,
+    /// Number of lines above the header that are not looked at.
+    pub(crate) skip_lines: Option<usize>,
+    /// Line of the header, from 1; 0 if there is none.
+    pub(crate) header_line: Option<usize>,
+    /// Whether what no key says is found out. Otherwise it is as documented: a header in the first
+    /// line, commas, decimal points, the column `velocity` in m/s, UTF-8.
+    pub(crate) is_found_out: bool,
+}
+
+impl CsvFormat {
+    /// Returns whether a key was given.
+    pub(super) fn has(&self, key: &str) -> bool {
+        match key {
+            "separator" => self.separator.is_some(),
+            "decimal" => self.decimal.is_some(),
+            "column" => self.column.is_some(),
+            "unit" => self.unit.is_some(),
+            "missing" => self.missing.is_some(),
+            "encoding" => self.encoding.is_some(),
+            "header_line" => self.header_line.is_some() || self.skip_lines.is_some(),
+            _ => false,
+        }
+    }
 }
 
 /// The character between the fields of a line.
@@ -27,6 +48,10 @@ pub(crate) enum Separator {
     Semicolon,
     Tab,
     Bar,
+    /// One or more blanks.
+    Space,
+    /// Two or more blanks: names and texts may have one between their words.
+    Spaces,
 }
 
 /// The character before the decimals.
@@ -47,7 +72,8 @@ pub(crate) enum VelocityUnit {
 }
 
 impl Separator {
-    pub(crate) const ALL: [Self; 4] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Bar];
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Comma, Self::Semicolon, Self::Tab, Self::Bar, Self::Space, Self::Spaces];
 
     /// Returns the name in a job file.
     pub(crate) fn name(self) -> &'static str {
@@ -56,16 +82,31 @@ impl Separator {
             Self::Semicolon => ";",
             Self::Tab => "tab",
             Self::Bar => "|",
+            Self::Space => "space",
+            Self::Spaces => "spaces",
         }
     }
 
-    /// Returns the character.
-    pub(crate) fn character(self) -> char {
+    /// Returns what separates the fields, in words.
+    pub(crate) fn described(self) -> &'static str {
         match self {
-            Self::Comma => ',',
-            Self::Semicolon => ';',
-            Self::Tab => '\t',
-            Self::Bar => '|',
+            Self::Comma => "commas",
+            Self::Semicolon => "semicolons",
+            Self::Tab => "tabs",
+            Self::Bar => "vertical bars",
+            Self::Space => "blanks",
+            Self::Spaces => "two or more blanks",
+        }
+    }
+
+    /// Returns the character between two fields; `None` for blanks, of which there may be any number.
+    pub(super) fn character(self) -> Option<char> {
+        match self {
+            Self::Comma => Some(','),
+            Self::Semicolon => Some(';'),
+            Self::Tab => Some('\t'),
+            Self::Bar => Some('|'),
+            Self::Space | Self::Spaces => None,
         }
     }
 
@@ -73,7 +114,7 @@ impl Separator {
     pub(crate) fn of_first_line(line: &str) -> Option<Self> {
         let mut named = line.trim_matches([' ', '"', '\r']).strip_prefix("sep=")?.chars();
         let (character, None) = (named.next()?, named.next()) else { return None };
-        Self::ALL.into_iter().find(|separator| separator.character() == character)
+        Self::ALL.into_iter().find(|separator| separator.character() == Some(character))
     }
 }
 
@@ -88,30 +129,29 @@ impl DecimalMark {
         }
     }
 
-    /// Reads a number.
-    pub(crate) fn number(self, text: &str) -> Option<f64> {
-        self.scaled(text, 0)
+    /// Returns the other mark.
+    pub(super) fn other(self) -> Self {
+        match self {
+            Self::Point => Self::Comma,
+            Self::Comma => Self::Point,
+        }
     }
 
-    /// Reads a number times a power of ten, rounded once: 3.9105 km/s is 3910.5 m/s to the bit.
-    fn scaled(self, text: &str, power: i32) -> Option<f64> {
-        let mut text = text.to_owned();
-        if self == Self::Comma {
-            if text.contains('.') {
-                return None;
-            }
-            text = text.replacen(',', ".", 1);
+    /// Returns the character.
+    pub(super) fn character(self) -> char {
+        match self {
+            Self::Point => '.',
+            Self::Comma => ',',
         }
-        let at = text.find(['e', 'E']).unwrap_or(text.len());
-        let (digits, exponent) = text.split_at(at);
-        if power == 0 || !digits.ends_with(|last: char| last.is_ascii_digit() || last == '.') {
-            return text.parse().ok();
+    }
+
+    /// Reads a plain number, without marks of thousands or a unit.
+    pub(super) fn number(self, text: &str) -> Option<f64> {
+        match self {
+            Self::Point => text.parse().ok(),
+            Self::Comma if text.contains('.') => None,
+            Self::Comma => text.replacen(',', ".", 1).parse().ok(),
         }
-        let exponent: i32 = match exponent.get(1..) {
-            Some(exponent) => exponent.parse().ok()?,
-            None => 0,
-        };
-        format!("{digits}e{}", exponent.checked_add(power)?).parse().ok()
     }
 }
 
@@ -134,17 +174,20 @@ impl VelocityUnit {
         Self::ALL.into_iter().find(|unit| unit.name() == text)
     }
 
+    /// Returns the velocity of one such unit, m/s.
+    pub(super) fn factor(self) -> f64 {
+        match self {
+            Self::MetrePerSecond => 1.0,
+            Self::KilometrePerSecond | Self::MillimetrePerMicrosecond => 1000.0,
+        }
+    }
+
     /// Returns the power of ten that makes a value one in m/s.
-    fn power(self) -> i32 {
+    pub(super) fn power(self) -> i32 {
         match self {
             Self::MetrePerSecond => 0,
             Self::KilometrePerSecond | Self::MillimetrePerMicrosecond => 3,
         }
-    }
-
-    /// Reads a velocity, and returns it in m/s.
-    pub(crate) fn velocity(self, text: &str, decimal: DecimalMark) -> Option<f64> {
-        decimal.scaled(text, self.power())
     }
 }
 
@@ -170,7 +213,7 @@ macro_rules! choices {
 
 choices! {
     Separator: |text| {
-        Self::ALL.into_iter().find(|one| one.name() == text || text == one.character().to_string())
+        Self::ALL.into_iter().find(|one| one.name() == text || one.character().is_some_and(|character| text == character.to_string()))
     },
     DecimalMark: |text| Self::ALL.into_iter().find(|one| one.name() == text),
     VelocityUnit: Self::of_text
@@ -179,35 +222,6 @@ choices! {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_velocity_is_the_same_to_the_bit_in_every_unit_and_with_every_mark() {
-        let check = |unit: VelocityUnit, decimal, text: &str, expected: Option<f64>| {
-            assert_eq!(unit.velocity(text, decimal), expected, "{unit:?} {text}");
-        };
-        let (point, comma) = (DecimalMark::Point, DecimalMark::Comma);
-        for unit in [VelocityUnit::KilometrePerSecond, VelocityUnit::MillimetrePerMicrosecond] {
-            check(unit, point, "3.9105", Some(3910.5));
-            check(unit, comma, "3,9105", Some(3910.5));
-            check(unit, point, "4", Some(4000.0));
-            check(unit, point, "4.", Some(4000.0));
-            check(unit, point, "39105e-4", Some(3910.5));
-            check(unit, point, "39.1E-1", Some(3910.0));
-            check(unit, point, "1e2147483647", None);
-            check(unit, point, "3,9105", None);
-            check(unit, comma, "3.910,5", None);
-            check(unit, point, "", None);
-            check(unit, point, "-3.9", Some(-3900.0));
-        }
-        check(VelocityUnit::MetrePerSecond, comma, "3910,5", Some(3910.5));
-        check(VelocityUnit::MetrePerSecond, comma, "3,910,5", None);
-        check(VelocityUnit::KilometrePerSecond, point, "inf", Some(f64::INFINITY));
-        for k in 1000..3000 {
-            let text = format!("{:.4}", f64::from(k) / 700.0);
-            let expected = format!("{text}e3").parse().ok();
-            check(VelocityUnit::KilometrePerSecond, point, &text, expected);
-        }
-    }
 
     #[test]
     fn names_are_read_as_people_write_them() {

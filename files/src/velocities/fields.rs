@@ -1,20 +1,30 @@
 //! The fields of a line of a CSV file.
 
+use super::csv_format::Separator;
 use super::problem::Problem;
 
 /// Returns the fields of one line, without surrounding space and quotes.
-pub(crate) fn csv_fields(line: &str, separator: char) -> Result<Vec<String>, Problem> {
+pub(super) fn csv_fields(line: &str, separator: Separator) -> Result<Vec<String>, Problem> {
+    match separator.character() {
+        Some(character) => separated(line, character),
+        None => blank_separated(line, if separator == Separator::Space { 1 } else { 2 }),
+    }
+}
+
+fn separated(line: &str, separator: char) -> Result<Vec<String>, Problem> {
     let is_space = |c: char| c.is_whitespace() && c != separator;
     let mut fields = Vec::new();
     let mut rest = line;
     loop {
-        let (field, after) = match rest.trim_start_matches(is_space).strip_prefix('"') {
-            Some(quoted) => quoted_field(quoted, separator)?,
+        let quoted = rest.trim_start_matches(is_space).strip_prefix('"');
+        let (field, after) = match quoted {
+            Some(quoted) => quoted_field(quoted, |after| {
+                let after = after.trim_start_matches(is_space);
+                (after.is_empty() || after.starts_with(separator)).then_some(after)
+            })?,
+            // A quote inside of a field is a character as any other: an inch, or a second.
             None => {
                 let end = rest.find(separator).unwrap_or(rest.len());
-                if rest[..end].contains('"') {
-                    return Err(Problem::Quote);
-                }
                 (rest[..end].trim().to_owned(), &rest[end..])
             }
         };
@@ -26,9 +36,53 @@ pub(crate) fn csv_fields(line: &str, separator: char) -> Result<Vec<String>, Pro
     }
 }
 
-/// Reads a field after its opening quote; returns it and the text after its closing quote, which is
-/// empty or begins with a separator.
-fn quoted_field(mut rest: &str, separator: char) -> Result<(String, &str), Problem> {
+/// Returns the fields between runs of at least so many blanks, or of a tab.
+fn blank_separated(line: &str, least: usize) -> Result<Vec<String>, Problem> {
+    let mut fields = Vec::new();
+    let mut rest = line.trim();
+    while !rest.is_empty() {
+        let (field, after) = match rest.strip_prefix('"') {
+            Some(quoted) => quoted_field(quoted, |after| {
+                (after.is_empty() || after.starts_with(char::is_whitespace)).then_some(after)
+            })?,
+            None => {
+                let end = first_run(rest, least);
+                (rest[..end].to_owned(), &rest[end..])
+            }
+        };
+        fields.push(field);
+        rest = after.trim_start();
+    }
+    if fields.is_empty() {
+        fields.push(String::new());
+    }
+    Ok(fields)
+}
+
+/// Returns where the first run of at least so many blanks, or of a tab, begins.
+fn first_run(text: &str, least: usize) -> usize {
+    let mut begin = None;
+    let mut count = 0;
+    for (at, c) in text.char_indices() {
+        if c == ' ' || c == '\t' {
+            count += if c == '\t' { least } else { 1 };
+            let begin = *begin.get_or_insert(at);
+            if count >= least {
+                return begin;
+            }
+        } else {
+            (begin, count) = (None, 0);
+        }
+    }
+    text.len()
+}
+
+/// Reads a field after its opening quote; returns it and the text after its closing quote, of which `ends`
+/// says what follows the field, if a field can end there.
+fn quoted_field(
+    mut rest: &str,
+    ends: impl Fn(&str) -> Option<&str>,
+) -> Result<(String, &str), Problem> {
     let mut field = String::new();
     loop {
         let (before, after) = rest.split_once('"').ok_or(Problem::Quote)?;
@@ -39,10 +93,31 @@ fn quoted_field(mut rest: &str, separator: char) -> Result<(String, &str), Probl
             rest = after;
             continue;
         }
-        let after = after.trim_start_matches(|c: char| c.is_whitespace() && c != separator);
-        if after.is_empty() || after.starts_with(separator) {
-            return Ok((field.trim().to_owned(), after));
-        }
-        return Err(Problem::Quote);
+        return match ends(after) {
+            Some(after) => Ok((field.trim().to_owned(), after)),
+            None => Err(Problem::Quote),
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_are_separated_as_the_file_says() {
+        let check = |line, separator, expected: &[&str]| {
+            assert_eq!(csv_fields(line, separator).ok().unwrap_or_default(), expected, "{line}");
+        };
+        check("a, \"b, \"\"c\"\"\" ,d", Separator::Comma, &["a", "b, \"c\"", "d"]);
+        check("5\" probe,1,", Separator::Comma, &["5\" probe", "1", ""]);
+        check("a;\tb", Separator::Semicolon, &["a", "b"]);
+        check("a\t\tb", Separator::Tab, &["a", "", "b"]);
+        check("   1   3908.5 ", Separator::Space, &["1", "3908.5"]);
+        check("\"a b\" 1", Separator::Space, &["a b", "1"]);
+        check("Sound speed   T [C]\tx", Separator::Spaces, &["Sound speed", "T [C]", "x"]);
+        check("", Separator::Space, &[""]);
+        check("\"open", Separator::Comma, &[]);
+        check("\"a\"b,c", Separator::Comma, &[]);
     }
 }

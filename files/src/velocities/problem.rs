@@ -1,56 +1,20 @@
 //! Faults of a CSV file of velocities, and of its lines.
 
-use std::{fmt, io};
+use std::io;
 
 use osteon_common::check::VELOCITY;
 use osteon_common::{limits, visible};
 use thiserror::Error;
 
-use super::csv_format::{DecimalMark, Separator};
+use super::csv_format::DecimalMark;
 
-/// The column of the velocities.
+/// The column of the velocities, if no key names another.
 pub(super) const COLUMN: &str = "velocity";
 /// Maximum number of characters of a file's text that a message quotes.
 const SHOWN_CHARACTERS_MAX: usize = 60;
 
 /// A fault and its line, from 1.
 pub(super) type LocatedProblem = (Option<usize>, Problem);
-
-/// How to read a file that is not written as expected, at the end of a message.
-#[derive(Debug)]
-pub(crate) enum CsvHint {
-    None,
-    Separator(Separator),
-    Column(String),
-    Decimal(DecimalMark),
-    Missing(String),
-    QuotedDecimal,
-}
-
-impl fmt::Display for CsvHint {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::None => Ok(()),
-            Self::Separator(separator) => {
-                write!(formatter, "; if its fields are separated so: [data] separator = {:?}", separator.name())
-            }
-            Self::Column(name) => {
-                write!(formatter, "; if those are the velocities: [data] column = {name:?}")
-            }
-            Self::Decimal(mark) => {
-                write!(formatter, " (if that is a decimal mark: [data] decimal = {:?})", mark.name())
-            }
-            Self::Missing(text) => write!(
-                formatter,
-                " (if that stands for a missing value: [data] missing = [{text:?}])"
-            ),
-            Self::QuotedDecimal => formatter.write_str(
-                " (if numbers have decimal commas: quote them, or separate fields by semicolons, and give \
-                 [data] decimal = \",\")",
-            ),
-        }
-    }
-}
 
 /// A fault. Its message completes a sentence that begins with the file or the line.
 #[derive(Debug, Error)]
@@ -64,6 +28,21 @@ pub(crate) enum Problem {
         limits::LINE_BYTES_MAX
     )]
     LongLine,
+    #[error("is {what}; {cure}")]
+    OtherKind { what: &'static str, cure: &'static str },
+    #[error("is {what} that cannot be read: {reason}; save the table as CSV")]
+    Damaged { what: &'static str, reason: String },
+    #[error("unpacks to more than {bytes} bytes; save the table as CSV")]
+    UnpackedTooLarge { bytes: u64 },
+    #[error("is {what} without a vector of numbers; save the velocities as one, or as CSV")]
+    NoVectors { what: &'static str },
+    #[error("has a character 0 inside of the line, which is no text; the file is damaged")]
+    Nul,
+    #[error(
+        "is not UTF-8 text, and its encoding is not clear; give it: [data] encoding = \"windows-1252\" (Western \
+         Europe), \"windows-1251\" (Cyrillic), \"shift_jis\", \"gbk\", …"
+    )]
+    UnknownEncoding,
     #[error(
         "is not UTF-8 text; give its encoding: [data] encoding = \"windows-1252\" (Western Europe, Latin-1), \
          \"utf-16le\", … or save it as UTF-8"
@@ -73,8 +52,72 @@ pub(crate) enum Problem {
     Empty,
     #[error("is not a header; it must name the columns, one of them `{COLUMN}`")]
     NoHeader,
-    #[error("no column `{column}`; the header has {columns}{hint}")]
-    NoColumn { column: String, columns: String, hint: CsvHint },
+    #[error("no column `{column}`; the header has {columns}")]
+    NoColumn { column: String, columns: String },
+    #[error(
+        "no column is clearly that of the velocities; the header has {columns}. If one is, name it: [data] column \
+         = \"…\" (and its unit)"
+    )]
+    NoVelocities { columns: String },
+    #[error(
+        "no column is one of velocities, but `{distance}` and `{time}` are a distance and a time: write \
+         their quotient into a column `velocity`"
+    )]
+    DistanceAndTime { distance: String, time: String },
+    #[error(
+        "several columns may be the velocities: {columns}; say which: [data] column = {first:?}, …"
+    )]
+    SeveralColumns { first: String, columns: String },
+    #[error(
+        "begins with numbers, and no line above names the columns: write the names above them, such as \
+         `velocity`, or say which column it is: [data] header_line = 0, column = \"1\", …"
+    )]
+    OnlyNumbers,
+    #[error(
+        "has names of columns again, others than in line {first}: these are two tables; write them into \
+         two files, or leave one of them out"
+    )]
+    TwoTables { first: usize, second: usize },
+    #[error("{first} and {second} both have velocities; save the one as CSV")]
+    SeveralTables { first: String, second: String },
+    #[error(
+        "the column `{column}` has another unit of velocity than m/s, km/s and mm/us; convert it to one of these"
+    )]
+    OtherUnit { column: String },
+    #[error(
+        "the column `{column}` has the median {median} where its unit is {unit}: no velocity of bone; say which \
+         is wrong: [data] unit = \"m/s\" or \"km/s\" (or column = \"…\")"
+    )]
+    OtherSize { column: String, median: f64, unit: &'static str },
+    #[error(
+        "the median of the column `{column}` is {median}; velocities of bone are 1000 to 8000 m/s, and no \
+         unit is said: [data] unit = \"m/s\", \"km/s\" or \"mm/us\" (or column = \"…\")"
+    )]
+    NoUsualSize { column: String, median: f64 },
+    #[error("the column `{column}` has {found:?}, which is no number; correct it in the file")]
+    NotNumbers { column: String, found: String },
+    #[error(
+        "the column `{column}` has {count} different texts that are no velocity, such as {first:?}; correct these in \
+         the file"
+    )]
+    ManyTexts { column: String, count: usize, first: String },
+    #[error(
+        "the velocity has another decimal mark than in line {first}; say which it is: [data] decimal = \".\" or \
+         \",\", and correct the others in the file"
+    )]
+    TwoMarks { first: usize },
+    #[error(
+        "the unit below the header is {found}, and that of the job {given}: [data] unit = {found:?}"
+    )]
+    UnitBelow { found: &'static str, given: &'static str },
+    #[error("velocity is {found:?}, and the unit is {given}; write all in one unit")]
+    UnitOfCell { found: String, given: &'static str },
+    #[error("{}", doubt_of_row(label, found, *.others))]
+    DoubtfulSummary { label: String, found: String, others: f64 },
+    #[error("has too many rows that seem to sum up others; leave them out of the file")]
+    ManySummaries,
+    #[error("has no row below the header; each must have a velocity")]
+    NoRowsBelow,
     #[error("the header has the column `{column}` twice")]
     RepeatedColumn { column: String },
     #[error("{column} is empty; it must name the {named} of the velocity")]
@@ -102,8 +145,11 @@ pub(crate) enum Problem {
     NoVariation { column: String },
     #[error("has more than {} groups", limits::GROUPS_MAX)]
     TooManyGroups,
-    #[error("the number of fields is {found}; the header has {expected}{hint}")]
-    FieldCount { found: usize, expected: usize, hint: CsvHint },
+    #[error(
+        "the number of fields is {found}; the header has {expected} (a field that contains the separator, or a \
+         decimal comma, must stand in quotes)"
+    )]
+    FieldCount { found: usize, expected: usize },
     #[error("a quote is not closed, or stands inside a field")]
     Quote,
     #[error(
@@ -111,8 +157,8 @@ pub(crate) enum Problem {
          [\"\"])"
     )]
     NoNumber,
-    #[error("velocity is {found:?}; it must be a number above 0{hint}")]
-    NotANumber { found: String, hint: CsvHint },
+    #[error("velocity is {found:?}; it must be a number above 0{}", cure_of_text(found, *.decimal, *.is_missing))]
+    NotANumber { found: String, decimal: Option<DecimalMark>, is_missing: bool },
     #[error("velocity {}", VELOCITY.refusal(*.found))]
     Refused { found: f64 },
     #[error("has no rows; a coefficient of variation needs at least two velocities")]
@@ -128,6 +174,62 @@ pub(crate) enum Problem {
     TooManySubjects,
     #[error("more lines with errors are not listed")]
     More,
+}
+
+impl Problem {
+    /// Returns whether no later row can mend it.
+    pub(super) fn is_final(&self) -> bool {
+        matches!(self, Self::TooMany | Self::TooManySubjects | Self::TooManyGroups)
+    }
+
+    /// Returns whether other keys on how the file is written may read it.
+    pub(super) fn may_be_of_format(&self) -> bool {
+        matches!(
+            self,
+            Self::NoHeader
+                | Self::NoColumn { .. }
+                | Self::FieldCount { .. }
+                | Self::NotANumber { decimal: None, is_missing: false, .. }
+                | Self::NotUtf8
+        )
+    }
+
+    /// Returns why none of these columns is that of the velocities.
+    pub(super) fn no_velocities(names: &[String]) -> Self {
+        let of = |parts: &[&str]| {
+            let has = |name: &&String| parts.iter().any(|part| name.to_lowercase().contains(part));
+            names.iter().find(has).map(|name| shortened(name))
+        };
+        match (of(&["dist", "length", "abstand"]), of(&["time", "tof", "zeit"])) {
+            (Some(distance), Some(time)) => Self::DistanceAndTime { distance, time },
+            _ => Self::NoVelocities { columns: listed(names) },
+        }
+    }
+}
+
+/// Asks whether a row is a measurement.
+fn doubt_of_row(label: &str, found: &str, others: f64) -> String {
+    let (row, cure) = match label {
+        "" => (String::new(), "fill its other cells".to_owned()),
+        label => (format!(" of {label:?}"), "give it another name".to_owned()),
+    };
+    format!(
+        "the velocity{row} is {found:?}, and the other rows give {others:.1}: if the row sums up others, delete \
+         it from the file, and otherwise {cure}"
+    )
+}
+
+/// Returns what to do with a velocity that is no number.
+fn cure_of_text(found: &str, decimal: Option<DecimalMark>, is_missing: bool) -> String {
+    match decimal {
+        Some(mark) => {
+            format!(" (if that is a decimal mark: [data] decimal = {:?})", mark.name())
+        }
+        None if is_missing => {
+            format!(" (if that stands for a missing value: [data] missing = [{found:?}])")
+        }
+        None => String::new(),
+    }
 }
 
 /// Returns the beginning of a text, on one line.

@@ -1,0 +1,419 @@
+//! Where a table begins in a text: the line with the names of its columns, and what separates them.
+
+use super::content::Content;
+use super::csv_format::{CsvFormat, DecimalMark, Separator};
+use super::fields::csv_fields;
+use super::names::ColumnName;
+use super::number::CellNumber;
+use super::problem::{LocatedProblem, Problem};
+use super::text_lines::{TextRecord, TextRecords};
+use super::units::{self, NamedUnit};
+
+/// Number of records in which the header is looked for.
+const RECORDS_MAX: usize = 1000;
+/// Most columns of a table whose header is to be found.
+const COLUMNS_MAX: usize = 1000;
+/// Most different headers that are looked at.
+const HEADERS_MAX: usize = 20;
+/// Most lines between the header and the first row: units, and rules.
+const BETWEEN_MAX: usize = 3;
+/// Rows whose first fields tell whether these are names that the header does not have.
+const ROW_NAMES: usize = 50;
+/// Marks with which programs begin a comment.
+const COMMENT_MARKS: [char; 5] = ['#', '%', '!', '*', '/'];
+
+/// Names of the columns, and where their rows begin.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Header {
+    /// Line of the names, from 1; 0 if there is none.
+    pub(super) line: usize,
+    /// Number of lines above the first row.
+    pub(super) lines_above: usize,
+    pub(super) separator: Separator,
+    pub(super) names: Vec<String>,
+    /// Whether a job file need not say what the separator is.
+    pub(super) is_separator_usual: bool,
+}
+
+impl Header {
+    /// Finds the header as the keys say, or as the text shows.
+    pub(super) fn of(content: &Content, format: &CsvFormat) -> Result<Self, LocatedProblem> {
+        let is_given = format.header_line.is_some() || !format.is_found_out;
+        if is_given { given(content, format) } else { found(content, format) }
+    }
+
+    /// Returns the records below the header.
+    pub(super) fn rows<'a>(&self, text: &'a str) -> TextRecords<'a> {
+        TextRecords::of(text, self.separator).skip_lines(self.lines_above)
+    }
+}
+
+/// Returns the fields of a line; one that has an open quote is one field.
+pub(super) fn fields_of(record: &TextRecord<'_>, separator: Separator) -> Vec<String> {
+    csv_fields(record.text, separator).unwrap_or_else(|_| vec![record.text.trim().to_owned()])
+}
+
+/// Returns whether a cell is a number, with either decimal mark.
+pub(super) fn is_number(cell: &str) -> bool {
+    DecimalMark::ALL.into_iter().any(|mark| CellNumber::read(cell, mark).is_some())
+}
+
+/// Returns whether fields are the units of columns rather than values of a row, given the places of
+/// velocities.
+pub(super) fn are_units(fields: &[String], places: &[usize]) -> bool {
+    let is_none = |field: &str| field.trim_matches(['-', ' ', '[', ']', '(', ')']).is_empty();
+    let of_place = |&place: &usize| units::of_velocity(fields.get(place)?);
+    let has_unit = fields.iter().any(|field| units::of_text(field).is_some());
+    places.iter().find_map(of_place).is_some()
+        || has_unit && fields.iter().all(|field| is_none(field) || units::of_text(field).is_some())
+}
+
+/// Returns whether fields are a line that is drawn, as below a header.
+pub(super) fn is_rule(fields: &[String]) -> bool {
+    let is_drawn = |field: &String| {
+        field.chars().all(|c| matches!(c, '-' | '=' | '_' | '+' | '|' | ' ' | ':'))
+    };
+    fields.iter().any(|field| field.len() >= 5) && fields.iter().all(is_drawn)
+}
+
+/// Returns the names in a header, which may stand in a comment.
+fn names_in(text: &str, separator: Separator) -> Result<Vec<String>, Problem> {
+    let text = text.trim_start();
+    let uncommented = text.trim_start_matches(COMMENT_MARKS);
+    let names =
+        csv_fields(if uncommented.trim().is_empty() { text } else { uncommented }, separator)?;
+    // A name over several lines has one blank between them.
+    let one_line = |name: String| name.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut names: Vec<String> = names.into_iter().map(one_line).collect();
+    if uncommented.len() < text.len() && names.len() > 1 && names[0].is_empty() {
+        names.remove(0);
+    }
+    Ok(names)
+}
+
+/// Returns the header where the keys say that it is: in the first line that is neither empty nor a
+/// comment, if none says more.
+fn given(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem> {
+    let named = content.separator().or(format.separator);
+    let skipped = match format.header_line {
+        Some(line) => line.saturating_sub(1),
+        None => format.skip_lines.unwrap_or(0),
+    };
+    let mut above = None;
+    let records = TextRecords::of(&content.text, named.unwrap_or_default()).skip_lines(skipped);
+    for record in records {
+        let record = record?;
+        let is_named = format.header_line == Some(record.line);
+        if !is_named && (record.is_blank() || record.is_comment()) {
+            continue;
+        }
+        if above.is_none() && format.header_line.is_none() {
+            above = Separator::of_first_line(record.text);
+            if above.is_some() {
+                continue;
+            }
+        }
+        let separator = named.or(above).unwrap_or_default();
+        let located = |problem| (Some(record.line), problem);
+        if format.header_line == Some(0) {
+            let count = csv_fields(record.text, separator).map_err(located)?.len();
+            let names = (1..=count).map(|place| place.to_string()).collect();
+            return Ok(Header {
+                line: 0,
+                lines_above: format.skip_lines.unwrap_or(0),
+                separator,
+                names,
+                is_separator_usual: named.is_none(),
+            });
+        }
+        let header = Header {
+            line: record.line,
+            lines_above: record.line + record.text.matches('\n').count(),
+            separator,
+            names: names_in(record.text, separator).map_err(located)?,
+            is_separator_usual: format.separator.is_none(),
+        };
+        let is_quoted = record.text.contains('"');
+        return Ok(with_row_names(header, &content.text, is_quoted));
+    }
+    Err((None, Problem::Empty))
+}
+
+/// Returns a header with a nameless first column, if each row begins with a name that the header does not
+/// have, as R writes it.
+fn with_row_names(mut header: Header, text: &str, is_quoted: bool) -> Header {
+    let rows: Vec<Vec<String>> = header
+        .rows(text)
+        .map_while(Result::ok)
+        .filter(|record| !record.is_blank() && !record.is_comment())
+        .take(ROW_NAMES)
+        .map(|record| trimmed(fields_of(&record, header.separator), header.names.len() + 1))
+        .collect();
+    if has_row_names(&header.names, header.separator, is_quoted, &rows) {
+        header.names.insert(0, String::new());
+    }
+    header
+}
+
+/// Returns fields without empty ones at the end beyond a count.
+pub(super) fn trimmed(mut fields: Vec<String>, count: usize) -> Vec<String> {
+    while fields.len() > count && fields.last().is_some_and(String::is_empty) {
+        fields.pop();
+    }
+    fields
+}
+
+/// Returns whether rows have one field more than the header, and their first fields are names of rows: all
+/// different, and counted from one number on, or no numbers.
+fn has_row_names(
+    names: &[String],
+    separator: Separator,
+    is_quoted: bool,
+    rows: &[Vec<String>],
+) -> bool {
+    // An unquoted comma within numbers makes one field more, too.
+    let is_certain = is_quoted || separator != Separator::Comma;
+    let is_longer = |row: &Vec<String>| {
+        row.len() == names.len() + 1 && row.last().is_some_and(|last| !last.is_empty())
+    };
+    if !is_certain || rows.is_empty() || !rows.iter().all(is_longer) {
+        return false;
+    }
+    let first: Vec<&str> = rows.iter().map(|row| row[0].as_str()).collect();
+    let numbers: Vec<i64> = first.iter().filter_map(|name| name.parse().ok()).collect();
+    let is_counted =
+        numbers.len() == first.len() && numbers.windows(2).all(|pair| pair[1] == pair[0] + 1);
+    let mut different = first.clone();
+    different.sort_unstable();
+    different.dedup();
+    let are_names = first.iter().all(|name| !is_number(name)) && different.len() == first.len();
+    is_counted || are_names
+}
+
+/// Finds the header by what it says, with every separator that may be.
+fn found(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem> {
+    let skipped = format.skip_lines.unwrap_or(0);
+    let above = above_of(&content.text);
+    let named = content.separator().or(format.separator).or(above);
+    let separators = named.map_or_else(|| Separator::ALL.to_vec(), |one| vec![one]);
+    let mut best = None;
+    let mut fallback = None;
+    let mut first_problem = None;
+    for separator in separators {
+        let beginning = Beginning::of(&content.text, separator, skipped)?;
+        match beginning.header() {
+            Ok(Some((score, header))) => keep_better(&mut best, score, header),
+            Err(problem) => first_problem = first_problem.or(Some(problem)),
+            _ => {}
+        }
+        if let Some((score, header)) = beginning.above_numbers() {
+            keep_better(&mut fallback, score, header);
+        }
+    }
+    let is_best = best.is_some();
+    if let (false, Some(problem)) = (is_best, first_problem) {
+        return Err(problem);
+    }
+    let (_, mut header) = best.or(fallback).ok_or((None, Problem::Empty))?;
+    let is_usual = header.separator == Separator::default() && format.separator.is_none();
+    header.is_separator_usual = is_usual || content.separator().is_some() || above.is_some();
+    if header.line == 0 {
+        return Err((Some(header.lines_above + 1), Problem::OnlyNumbers));
+    }
+    Ok(header)
+}
+
+/// How well a separator makes a table of a text: by the number of rows; then rather between several columns, and
+/// by a character than by blanks; then by the number of columns.
+type Fit = (usize, u8, usize);
+
+/// Keeps a header if it fits better.
+fn keep_better(best: &mut Option<(Fit, Header)>, rows: usize, header: Header) {
+    let width = header.names.len();
+    // A unit is no column of its own.
+    let is_torn = header.names.iter().any(|name| is_velocity_unit(name));
+    let rank = match header.separator.character() {
+        _ if width == 1 || is_torn => 0,
+        None => 1,
+        Some(_) => 2,
+    };
+    let fit = (rows, rank, width);
+    if best.as_ref().is_none_or(|(other, _)| fit > *other) {
+        *best = Some((fit, header));
+    }
+}
+
+/// Returns the separator that the first line names.
+fn above_of(text: &str) -> Option<Separator> {
+    Separator::of_first_line(text.lines().find(|line| !line.trim().is_empty())?)
+}
+
+/// The first records of a text, in which its header is looked for.
+struct Beginning<'a> {
+    separator: Separator,
+    records: Vec<(TextRecord<'a>, Vec<String>)>,
+    /// Which of these have a number.
+    have_number: Vec<bool>,
+}
+
+impl<'a> Beginning<'a> {
+    fn of(text: &'a str, separator: Separator, skipped: usize) -> Result<Self, LocatedProblem> {
+        let mut records = Vec::new();
+        for record in TextRecords::of(text, separator).skip_lines(skipped) {
+            let record = record?;
+            if record.is_blank() || Separator::of_first_line(record.text).is_some() {
+                continue;
+            }
+            records.push((record, fields_of(&record, separator)));
+            if records.len() == RECORDS_MAX {
+                break;
+            }
+        }
+        let has_number = |(_, fields): &(TextRecord<'_>, Vec<String>)| {
+            fields.iter().any(|field| is_number(field))
+        };
+        let have_number = records.iter().map(has_number).collect();
+        Ok(Self { separator, records, have_number })
+    }
+
+    /// Returns the header that names velocities with numbers below, and the number of its rows.
+    fn header(&self) -> Result<Option<(usize, Header)>, LocatedProblem> {
+        let mut found: Vec<(usize, usize, Header, bool)> = Vec::new();
+        for at in 0..self.records.len() {
+            if found.len() == HEADERS_MAX {
+                break;
+            }
+            let Some((header, places)) = self.candidate(at) else { continue };
+            let is_new = found.iter().all(|(_, _, other, _)| other.names != header.names);
+            if !is_new {
+                continue;
+            }
+            let has_word =
+                places.iter().any(|&place| ColumnName::of(&header.names[place]).has_word());
+            let score = self.rows_below(at, &header, &places, self.records.len());
+            if let Some((before, _, other, _)) = found.last() {
+                let places = velocity_places(&other.names);
+                if self.rows_below(*before, other, &places, at) > 1 {
+                    let (first, second) = (other.line, header.line);
+                    return Err((Some(second), Problem::TwoTables { first, second }));
+                }
+            }
+            found.push((at, score, header, has_word));
+        }
+        let any_word = found.iter().any(|(_, _, _, has_word)| *has_word);
+        found.retain(|(_, _, _, has_word)| *has_word || !any_word);
+        Ok(found.pop().map(|(_, score, header, _)| (score, header)))
+    }
+
+    /// Returns the record as a header, with the places of its columns of velocities, if the next row has a
+    /// number in one of them.
+    fn candidate(&self, at: usize) -> Option<(Header, Vec<usize>)> {
+        let (record, _) = &self.records[at];
+        let below = &self.have_number[at + 1..self.records.len().min(at + ROW_NAMES)];
+        if self.have_number[at] || !below.contains(&true) {
+            return None;
+        }
+        let names = names_in(record.text, self.separator).ok()?;
+        let is_wide = names.len() > COLUMNS_MAX;
+        if is_wide || names.iter().any(|name| is_number(name)) || velocity_places(&names).is_empty()
+        {
+            return None;
+        }
+        let rows: Vec<Vec<String>> = self.below(at, &names).take(ROW_NAMES).collect();
+        let mut header = self.header_at(at, names);
+        if has_row_names(&header.names, self.separator, record.text.contains('"'), &rows) {
+            header.names.insert(0, String::new());
+        }
+        let places = velocity_places(&header.names);
+        let is_row = |row: &&Vec<String>| {
+            row.len() == header.names.len()
+                && places.iter().any(|&place| is_number(&row[place]) || is_gap(&row[place]))
+        };
+        let matching = rows.iter().filter(is_row).count();
+        (matching > 0 && 3 * matching >= rows.len()).then_some((header, places))
+    }
+
+    /// Returns the fields of the records below a header that may be rows: not comments, rules, or units.
+    fn below(&self, at: usize, names: &[String]) -> impl Iterator<Item = Vec<String>> {
+        let (count, places) = (names.len(), velocity_places(names));
+        let below = self.records[at + 1..].iter().enumerate();
+        below
+            .filter(move |(behind, (record, fields))| {
+                let is_between =
+                    *behind < BETWEEN_MAX && (is_rule(fields) || are_units(fields, &places));
+                !is_between && !record.is_comment()
+            })
+            .map(move |(_, (_, fields))| trimmed(fields.clone(), count))
+    }
+
+    /// Returns how many records between a header and another place have numbers in one of its columns of
+    /// velocities.
+    fn rows_below(&self, at: usize, header: &Header, places: &[usize], end: usize) -> usize {
+        let is_row = |(_, fields): &&(TextRecord<'_>, Vec<String>)| {
+            let fields = trimmed(fields.to_vec(), header.names.len());
+            fields.len() == header.names.len()
+                && places.iter().any(|&place| is_number(&fields[place]))
+        };
+        self.records[at + 1..end].iter().filter(is_row).count()
+    }
+
+    fn header_at(&self, at: usize, names: Vec<String>) -> Header {
+        let record = &self.records[at].0;
+        Header {
+            line: record.line,
+            lines_above: record.line + record.text.matches('\n').count(),
+            separator: self.separator,
+            names,
+            is_separator_usual: false,
+        }
+    }
+
+    /// Returns the header above the first row of numbers, whatever it says, and how many rows there are; the
+    /// line 0 if there is none.
+    fn above_numbers(&self) -> Option<(usize, Header)> {
+        let first = self.have_number.iter().position(|&has_number| has_number);
+        let Some(first) = first else {
+            // Nothing but texts: the first line has the names.
+            let (record, _) = self.records.first()?;
+            return Some((0, self.header_at(0, names_in(record.text, self.separator).ok()?)));
+        };
+        let width = self.records[first].1.len();
+        let rows = self.records[first..].iter().filter(|(_, fields)| fields.len() == width).count();
+        let names_of =
+            |record: &TextRecord<'_>| names_in(record.text, self.separator).unwrap_or_default();
+        let above = self.records[..first]
+            .iter()
+            .rposition(|(record, _)| names_of(record).len() == width)
+            // The rows may all have another number of fields.
+            .or_else(|| {
+                let last = first.checked_sub(1)?;
+                let names = names_of(&self.records[last].0);
+                (!velocity_places(&names).is_empty()).then_some(last)
+            });
+        let Some(above) = above else {
+            let mut none = self.header_at(first, Vec::new());
+            (none.lines_above, none.line) = (none.line - 1, 0);
+            none.names = vec![String::new(); width];
+            return Some((rows, none));
+        };
+        let names = names_in(self.records[above].0.text, self.separator).ok()?;
+        Some((rows, self.header_at(above, names)))
+    }
+}
+
+/// Returns whether a cell has no value.
+fn is_gap(cell: &str) -> bool {
+    cell.is_empty() || ["-", "--", "NA", "N/A", "NaN", "nan"].contains(&cell)
+}
+
+/// Returns the places of names that are of velocities, and not only a unit.
+pub(super) fn velocity_places(names: &[String]) -> Vec<usize> {
+    let is_one =
+        |name: &&String| !is_velocity_unit(name) && ColumnName::of(name).is_of_velocities();
+    let places = names.iter().enumerate().filter(|(_, name)| is_one(name));
+    places.map(|(place, _)| place).collect()
+}
+
+fn is_velocity_unit(name: &str) -> bool {
+    matches!(units::of_text(name), Some(NamedUnit::Velocity(_) | NamedUnit::OtherVelocity))
+}
