@@ -37,7 +37,7 @@ pub struct Contradiction {
 
 /// A decided ballot.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Verdict {
+pub(crate) struct BallotResult {
     /// The hosts that gave the answer that counts.
     pub(crate) agreeing: Vec<String>,
     /// A worker of each of the other hosts, with the first index at which its answer differs.
@@ -146,7 +146,7 @@ impl Ballot {
     }
 
     /// Returns what `voters` hosts have decided: `None` as long as no answer has a majority.
-    pub(crate) fn verdict(&self, voters: usize) -> Option<Verdict> {
+    pub(crate) fn verdict(&self, voters: usize) -> Option<BallotResult> {
         let right = self.leading().filter(|_| self.lacks(voters) == 0)?;
         let votes = || self.votes.values();
         let agreeing = votes().filter(|(_, place)| *place == right).map(|(by, _)| by);
@@ -157,7 +157,7 @@ impl Ballot {
             self.difference((first, answer(right)), (by, answer(*place)))
         };
         let outvoted = votes().filter_map(differs).collect();
-        Some(Verdict {
+        Some(BallotResult {
             agreeing: agreeing.iter().map(|by| by.host().to_owned()).collect(),
             outvoted,
         })

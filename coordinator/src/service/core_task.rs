@@ -271,11 +271,7 @@ impl Core {
                     }
                 }
                 Effect::Reopen { reply_id, job } => {
-                    let command = StoreCommand::Reopen { reply_id, job };
-                    if let Err(refused) = self.commands.try_send(command) {
-                        let outcome = Err(refused.to_string());
-                        followups.push_back(Event::Reopened { reply_id, job, outcome });
-                    }
+                    followups.extend(self.reopen(reply_id, job));
                 }
                 Effect::Answer { reply_id, answer } => {
                     if let Some(reply) = self.waiting.remove(&reply_id) {
@@ -291,6 +287,12 @@ impl Core {
                 Effect::Stop => self.stop(),
             }
         }
+    }
+
+    /// Has the store make an ended job an unfinished one; returns the event that it cannot be asked.
+    fn reopen(&self, reply_id: ReplyId, job: JobId) -> Option<Event> {
+        let refused = self.commands.try_send(StoreCommand::Reopen { reply_id, job }).err()?;
+        Some(Event::Reopened { reply_id, job, outcome: Err(refused.to_string()) })
     }
 
     /// Completes an evaluation on a thread of its own. A job has at most one at a time.

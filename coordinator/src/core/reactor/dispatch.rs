@@ -21,10 +21,11 @@ use crate::core::job::Job;
 use crate::core::reactor::turn::Turn;
 
 pub(super) mod ahead;
-pub(super) mod audits;
+mod audits;
 pub(super) mod batches;
+pub(super) mod clearance;
 pub(super) mod departures;
-mod duplicates;
+pub(super) mod duplicates;
 mod eta;
 mod idle;
 pub(super) mod new_proof;
@@ -34,6 +35,7 @@ pub(super) mod proofs;
 mod schedule;
 pub(super) mod sizing;
 pub(super) mod speculation;
+pub(super) mod votes;
 
 /// Sends batches while workers can accept more and work waits, then duplicates.
 pub(crate) fn dispatch(turn: &mut Turn) {

@@ -12,7 +12,7 @@
 use osteon_common::parameters::Point;
 use osteon_search::same_point;
 
-use super::{batches, proofs};
+use super::{batches, clearance};
 use crate::core::ahead::{FollowedBranch, PreparedEvaluation};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::JobId;
@@ -71,7 +71,7 @@ pub(crate) fn keep_if_awaited(job: &mut Job, record: &EvaluationRecord) {
 
 /// Takes in a complete evaluation of a branch, if `attempt` is one, and begins the next.
 pub(crate) fn settle(turn: &mut Turn, id: JobId, attempt: u64) {
-    proofs::clear(turn, id, attempt);
+    clearance::clear(turn, id, attempt);
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };

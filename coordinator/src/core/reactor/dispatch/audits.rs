@@ -1,14 +1,10 @@
 //! Chooses the workers for audits and tie-breakers.
 
-use std::collections::BTreeSet;
-use std::time::Duration;
-
-use super::{batches, overdue, poison, schedule, sizing};
-use crate::core::ballot::VOTERS_MAX;
+use super::{batches, poison, schedule, sizing, votes};
 use crate::core::batch::{Assignment, Purpose};
 use crate::core::dispute::Dispute;
 use crate::core::evaluation::Audit;
-use crate::core::ids::{BatchId, JobId, WorkerId};
+use crate::core::ids::{JobId, WorkerId};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, State};
 use crate::core::worker_name::WorkerName;
@@ -86,31 +82,9 @@ fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
             !worker.draining && !dispute.has_vote_of(host) && !asked.contains(&host)
         };
         let best = state.workers.values().filter(may).map(reputation).min();
-        lacks_votes(state, dispute) && may(&worker) && best == Some(reputation(worker))
+        votes::are_lacking(state, dispute) && may(&worker) && best == Some(reputation(worker))
     };
     evaluation.disputes.iter().position(is_for)
-}
-
-/// Returns whether a dispute needs more votes than are on their way.
-pub(crate) fn lacks_votes(state: &State, dispute: &Dispute) -> bool {
-    // At least one more: without it there would be no dispute.
-    let lacks = dispute.ballot.lacks(voters(state, dispute, None)).max(1);
-    dispute.tie_breakers.len() < lacks
-}
-
-/// Returns the number of hosts that may decide a dispute: those that have voted, and those with workers that
-/// answer batches, at most as many as are asked. With the time, hosts do not count that were asked and have
-/// not answered for too long.
-pub(crate) fn voters(state: &State, dispute: &Dispute, now: Option<Duration>) -> usize {
-    let is_late = |id: &&BatchId| now.is_some_and(|now| overdue::is_overdue(state, **id, now));
-    let late = dispute.tie_breakers.iter().filter(is_late).filter_map(|id| state.batches.get(id));
-    let late: Vec<WorkerId> = late.map(|batch| batch.worker).collect();
-    let answers = |(id, worker): &(&WorkerId, &AttachedWorker)| {
-        state.is_checker(worker) && worker.missed.count == 0 && !late.contains(id)
-    };
-    let attached = state.workers.iter().filter(answers).map(|(_, worker)| worker.name.host());
-    let hosts: BTreeSet<&str> = attached.chain(dispute.ballot.hosts()).collect();
-    hosts.len().min(VOTERS_MAX)
 }
 
 /// Sends a worker the tie-breaker of a dispute.

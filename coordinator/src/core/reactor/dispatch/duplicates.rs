@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use super::overdue::DUPLICATES_MAX;
 use super::{batches, eta};
 use crate::core::batch::{Batch, Purpose};
 use crate::core::ids::{BatchId, WorkerId};
@@ -10,6 +9,9 @@ use crate::core::reactor::turn::Turn;
 use crate::core::service_order::ServicePlace;
 use crate::core::state::State;
 
+/// Maximum number of batches with the same indices at a time. The last of them would be sent after
+/// six minutes at the earliest.
+pub(crate) const DUPLICATES_MAX: usize = 8;
 /// A batch that has taken this many times its expected time is duplicated before anything is
 /// computed speculatively.
 const LATE: u32 = 2;

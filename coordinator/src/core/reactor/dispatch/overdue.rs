@@ -11,6 +11,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use super::duplicates::DUPLICATES_MAX;
 use super::poison::{self, Reputation};
 use super::{batches, duplicates, schedule};
 use crate::core::batch::{Assignment, Batch, Purpose};
@@ -28,9 +29,6 @@ const OVERDUE_MIN: Duration = Duration::from_secs(3);
 /// No batch is overdue before it has taken this many times its expected time: a machine may have
 /// other things to do, and one point may take several times as long as another.
 const OVERDUE_FACTOR: u32 = 4;
-/// Maximum number of batches with the same indices at a time. The last of them would be sent after
-/// six minutes at the earliest.
-pub(crate) const DUPLICATES_MAX: usize = 8;
 /// Maximum number of duplicates that are sent on one event; the others follow on the next.
 const SENT_AT_ONCE_MAX: usize = 64;
 /// A worker is on probation after this many consecutive batches that others answered, over at least

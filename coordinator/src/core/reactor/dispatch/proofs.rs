@@ -1,20 +1,14 @@
-//! Asks workers for their proofs, and decides whether the results of an evaluation may count.
+//! Asks workers for their proofs of a setup.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
 
-use super::overdue;
-use crate::core::audit;
 use crate::core::ballot::VOTERS_MAX;
 use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::effect::Effect;
-use crate::core::evaluation::{Audit, PendingEvaluation};
 use crate::core::ids::{BatchId, JobId, WorkerId};
-use crate::core::job::Job;
 use crate::core::proofs::SetupKey;
 use crate::core::reactor::turn::Turn;
-use crate::core::state::{AttachedWorker, State};
-use crate::core::worker_name::WorkerName;
+use crate::core::state::AttachedWorker;
 
 /// Asks a worker that is about to get a batch of a job for its proof of the setup, if there is another
 /// host to compare it with. The first time, further hosts are asked, too, for a majority.
@@ -56,7 +50,7 @@ fn begin(turn: &mut Turn, id: JobId, setup: SetupKey) -> bool {
 }
 
 /// Asks hosts that have not voted, until so many have, or are asked.
-fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) {
+pub(super) fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) {
     let Some(setup) = turn.state.jobs.get(&job).map(|job| job.setup) else {
         return;
     };
@@ -105,221 +99,4 @@ pub(super) fn ask(turn: &mut Turn, worker: WorkerId, job: JobId) {
         proofs.out.insert(worker, batch);
     }
     turn.effects.push(Effect::Send { worker, batch, work });
-}
-
-/// Returns the number of hosts whose votes on a setup count: those that have voted, and those whose
-/// answers are on their way.
-pub(crate) fn voters(state: &State, setup: &SetupKey, now: Duration) -> usize {
-    let Some(proofs) = state.proofs.of(setup) else {
-        return 0;
-    };
-    if proofs.out.is_empty() {
-        return proofs.ballot.count();
-    }
-    let awaited = proofs.out.iter().filter(|(_, batch)| !overdue::is_overdue(state, **batch, now));
-    let awaited = awaited.filter_map(|(id, _)| Some(state.workers.get(id)?.name.host()));
-    awaited.chain(proofs.ballot.hosts()).collect::<BTreeSet<_>>().len()
-}
-
-/// Returns the attempts at evaluations of a job whose results come from workers without a proof that the
-/// majority confirms. They are not saved: after a restart nobody would know that they do not count yet.
-pub(crate) fn unproven_attempts(state: &State, job: JobId, now: Duration) -> BTreeSet<u64> {
-    let Some(job) = state.jobs.get(&job) else {
-        return BTreeSet::new();
-    };
-    let Some(proofs) = state.proofs.of(&job.setup) else {
-        return BTreeSet::new();
-    };
-    let voters = voters(state, &job.setup, now);
-    let confirms =
-        |name: &WorkerName| proofs.is_given_by(name) && proofs.ballot.confirms(name.host(), voters);
-    let unproven = job.certain().filter(|evaluation| !evaluation.workers.iter().all(confirms));
-    unproven.map(|evaluation| evaluation.attempt).collect()
-}
-
-/// What the results of a worker need before they count.
-enum Need {
-    Nothing,
-    /// Its proof, or the votes of others.
-    Votes,
-    /// The worker has to be asked for its proof.
-    Proof(WorkerId),
-    /// It cannot give its proof any more.
-    Audit,
-}
-
-/// Decides whether the results of a complete evaluation may count, and asks for what is missing.
-pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
-    let found = turn.state.jobs.get(&id).and_then(|job| Some((job, of_attempt(job, attempt)?)));
-    let Some((job, evaluation)) = found else {
-        return;
-    };
-    if evaluation.is_cleared || evaluation.filled() < evaluation.realizations() {
-        return;
-    }
-    let setup = job.setup;
-    let state = &*turn.state;
-    let voters = voters(state, &setup, turn.now);
-    let names = evaluation.workers.iter().enumerate();
-    let needs: Vec<(usize, Need)> = names
-        .map(|(place, name)| {
-            (place, need(state, (evaluation, place), name, (&setup, voters), turn.now))
-        })
-        .collect();
-    let mut is_cleared = true;
-    let mut audited = Vec::new();
-    for (place, need) in needs {
-        is_cleared &= matches!(need, Need::Nothing | Need::Audit);
-        match need {
-            Need::Nothing | Need::Votes => {}
-            Need::Proof(worker) => ask(turn, worker, id),
-            Need::Audit => audited.push(place),
-        }
-    }
-    let Some(job) = turn.state.jobs.get_mut(&id) else {
-        return;
-    };
-    let Some(evaluation) = of_attempt_mut(job, attempt) else {
-        return;
-    };
-    for place in audited {
-        audit_last(evaluation, place, None);
-    }
-    if is_cleared {
-        evaluation.is_cleared = true;
-        audit_last_answers(turn, id, attempt);
-    }
-}
-
-/// Queues an audit of one realization of the last answer of each worker, so that a machine that has broken
-/// meanwhile is found before the evaluation counts. Where that were more than the fraction of the realizations
-/// that is audited, as with many workers, it is found by its next audit.
-fn audit_last_answers(turn: &mut Turn, id: JobId, attempt: u64) {
-    let (key, fraction) = (turn.state.config.audit_key, turn.state.config.audit_fraction);
-    let state = &*turn.state;
-    let Some(evaluation) = state.jobs.get(&id).and_then(|job| of_attempt(job, attempt)) else {
-        return;
-    };
-    if evaluation.workers.len() as f64 > fraction * evaluation.realizations() as f64 {
-        return;
-    }
-    let workers = evaluation.workers.iter().enumerate();
-    let due = workers.filter(|(place, name)| {
-        !evaluation.vouched.contains(place) && state.can_check(name.host())
-    });
-    let due: Vec<(usize, WorkerName)> = due.map(|(place, name)| (place, name.clone())).collect();
-    for (place, name) in due {
-        let job = turn.state.jobs.get_mut(&id);
-        if let Some(evaluation) = job.and_then(|job| of_attempt_mut(job, attempt)) {
-            audit_last(evaluation, place, Some(&key));
-            turn.state.count_checked(&name, 1);
-        }
-    }
-}
-
-fn of_attempt(job: &Job, attempt: u64) -> Option<&PendingEvaluation> {
-    job.certain().find(|evaluation| evaluation.attempt == attempt)
-}
-
-fn of_attempt_mut(job: &mut Job, attempt: u64) -> Option<&mut PendingEvaluation> {
-    job.certain_mut().find(|evaluation| evaluation.attempt == attempt)
-}
-
-/// Returns what the results of the worker at a place of an evaluation need.
-fn need(
-    state: &State,
-    (evaluation, place): (&PendingEvaluation, usize),
-    name: &WorkerName,
-    (setup, voters): (&SetupKey, usize),
-    now: Duration,
-) -> Need {
-    let Some(proofs) = state.proofs.of(setup) else {
-        // As long as all workers are of one host, nothing can be compared.
-        return Need::Nothing;
-    };
-    if proofs.is_given_by(name) {
-        return match proofs.ballot.confirms(name.host(), voters) {
-            true => Need::Nothing,
-            false => Need::Votes,
-        };
-    }
-    let attached = state.workers.iter().find(|(_, worker)| worker.name == *name);
-    let is_late = |batch: &BatchId| overdue::is_overdue(state, *batch, now);
-    match attached.map(|(id, _)| (*id, proofs.out.get(id))) {
-        Some((id, None)) => Need::Proof(id),
-        Some((_, Some(batch))) if !is_late(batch) => Need::Votes,
-        _ if evaluation.vouched.contains(&place) || !state.can_check(name.host()) => Need::Nothing,
-        _ => Need::Audit,
-    }
-}
-
-/// Queues an audit of the last answer of a worker, unless it has been audited; with a key, of one
-/// realization of it.
-fn audit_last(evaluation: &mut PendingEvaluation, place: usize, one: Option<&audit::AuditKey>) {
-    if !evaluation.vouched.insert(place) {
-        return;
-    }
-    let (Some(last), Some(by)) =
-        (evaluation.last_answers.get(place), evaluation.workers.get(place))
-    else {
-        return;
-    };
-    let indices = one.map_or(*last, |key| audit::choose_one(key, evaluation.attempt, *last));
-    evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
-}
-
-/// Puts workers on probation that do not answer, and asks further hosts where no answer has a majority. Returns
-/// the setups of which something may have been decided.
-pub(crate) fn tick(turn: &mut Turn) -> Vec<SetupKey> {
-    let mut changed = Vec::new();
-    let setups: Vec<SetupKey> = turn.state.proofs.setups().copied().collect();
-    for setup in setups {
-        let Some(proofs) = turn.state.proofs.of(&setup) else {
-            continue;
-        };
-        let late =
-            |(_, batch): &(&WorkerId, &BatchId)| overdue::is_overdue(turn.state, **batch, turn.now);
-        let names = proofs.out.iter().filter(late).filter_map(|(worker, batch)| {
-            let sent = turn.state.batches.get(batch)?.sent;
-            Some((turn.state.workers.get(worker)?.name.clone(), sent))
-        });
-        let late: Vec<(WorkerName, Duration)> = names.collect();
-        // The batch stays with the worker: it may be slow, and its answer ends the probation.
-        for (name, sent) in &late {
-            overdue::begin_probation(turn.state, name, *sent, turn.now);
-        }
-        let is_undecided = ask_for_majority(turn, &setup);
-        if !late.is_empty() || is_undecided {
-            changed.push(setup);
-        }
-    }
-    changed
-}
-
-/// Asks further hosts where those asked have no majority. Notes since when there is none.
-fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) -> bool {
-    let Some(proofs) = turn.state.proofs.of(setup) else {
-        return false;
-    };
-    let voters = voters(turn.state, setup, turn.now);
-    let voted = proofs.ballot.count();
-    let lacks = proofs.ballot.lacks(voters);
-    let now = turn.now;
-    if let Some(proofs) = turn.state.proofs.of_mut(setup) {
-        let undecided = voted > 1 && lacks > 0;
-        proofs.undecided_since = undecided.then(|| proofs.undecided_since.unwrap_or(now));
-    }
-    if voted < 2 || voters > voted || lacks == 0 {
-        return false;
-    }
-    let job = turn
-        .state
-        .active
-        .iter()
-        .find(|id| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup));
-    let Some(job) = job.copied() else {
-        return false;
-    };
-    ask_further(turn, job, voted + lacks);
-    true
 }

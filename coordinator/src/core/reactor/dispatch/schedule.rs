@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
-use super::audits;
+use super::votes;
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::Job;
 use crate::core::state::State;
@@ -51,6 +51,6 @@ pub(crate) fn checks_wait(state: &State) -> bool {
     jobs.any(|job| {
         let mut disputes = job.evaluation().into_iter().flat_map(|asked_for| &asked_for.disputes);
         job.certain().any(|evaluation| !evaluation.audits.is_empty())
-            || disputes.any(|dispute| audits::lacks_votes(state, dispute))
+            || disputes.any(|dispute| votes::are_lacking(state, dispute))
     })
 }

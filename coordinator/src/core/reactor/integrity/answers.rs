@@ -54,12 +54,7 @@ pub(crate) fn answered(
         workers::close(turn, worker, reason);
         return;
     }
-    if lacks_decays(turn.state, &assignment, &solved) {
-        let reason = Malformed::Missing { field: "decays" };
-        workers::close(turn, worker, CloseReason::Malformed(reason));
-        return;
-    }
-    if let Some(reason) = implausible(turn.state, &assignment, &solved) {
+    if let Some(reason) = unusable(turn.state, &assignment, &solved) {
         workers::close(turn, worker, reason);
         return;
     }
@@ -98,6 +93,18 @@ pub(crate) fn answered(
     }
     jobs::settle(turn, assignment.job, assignment.attempt);
     departures::dismiss_if_drained(turn, worker);
+}
+
+/// Returns why answers cannot be used, if they cannot.
+fn unusable(
+    state: &State,
+    assignment: &Assignment,
+    solved: &[RealizationResult],
+) -> Option<CloseReason> {
+    if lacks_decays(state, assignment, solved) {
+        return Some(CloseReason::Malformed(Malformed::Missing { field: "decays" }));
+    }
+    implausible(state, assignment, solved)
 }
 
 /// Returns whether the job asks for decays and a velocity has none: the worker does not know of decays.

@@ -8,7 +8,7 @@ use osteon_common::parameters::{BONE_PARAMETERS, Point};
 
 use super::bans;
 use crate::core::audit;
-use crate::core::ballot::{Ballot, Cast, Contradiction, Verdict, Vote};
+use crate::core::ballot::{Ballot, BallotResult, Cast, Contradiction, Vote};
 use crate::core::batch::Assignment;
 use crate::core::dispute::Dispute;
 use crate::core::evaluation::{Audit, PendingEvaluation};
@@ -16,7 +16,7 @@ use crate::core::failure::{RunFailure, shown};
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::Job;
 use crate::core::proofs::SetupKey;
-use crate::core::reactor::dispatch::{audits, batches, new_proof, overdue, poison, proofs};
+use crate::core::reactor::dispatch::{batches, clearance, new_proof, overdue, poison, votes};
 use crate::core::reactor::lifecycle::jobs;
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
@@ -139,7 +139,7 @@ pub(crate) fn proven(
 /// Bans the hosts whose proofs of a setup differ from that of the majority, and lets evaluations continue
 /// that waited for it.
 pub(crate) fn decide_proofs(turn: &mut Turn, setup: &SetupKey) {
-    let voters = proofs::voters(turn.state, setup, turn.now);
+    let voters = clearance::voters(turn.state, setup, turn.now);
     let verdict = turn.state.proofs.of(setup).and_then(|proofs| proofs.ballot.verdict(voters));
     let of_setup = |id: &&JobId| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup);
     let jobs: Vec<JobId> = turn.state.active.iter().filter(of_setup).copied().collect();
@@ -183,8 +183,9 @@ fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
     let Some(dispute) = found.and_then(|evaluation| evaluation.disputes.get(at)) else {
         return;
     };
-    let Some(verdict) = dispute.ballot.verdict(audits::voters(turn.state, dispute, Some(turn.now)))
-    else {
+    let is_late = |batch| overdue::is_overdue(turn.state, batch, turn.now);
+    let voters = votes::voters(turn.state, dispute, is_late);
+    let Some(verdict) = dispute.ballot.verdict(voters) else {
         return;
     };
     let Some(job_) = turn.state.jobs.get_mut(&job) else {
@@ -205,8 +206,8 @@ fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
 }
 
 /// Bans the hosts that were outvoted.
-fn ban_outvoted(turn: &mut Turn, job: JobId, verdict: Verdict) {
-    let Verdict { agreeing, outvoted } = verdict;
+fn ban_outvoted(turn: &mut Turn, job: JobId, verdict: BallotResult) {
+    let BallotResult { agreeing, outvoted } = verdict;
     let (first, others) = agreeing.split_at(agreeing.len().min(HOSTS_SHOWN_MAX));
     let further =
         if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
@@ -230,7 +231,7 @@ pub(crate) fn give_up(turn: &mut Turn) {
         return;
     }
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
-    for setup in proofs::tick(turn) {
+    for setup in clearance::tick(turn) {
         decide_proofs(turn, &setup);
     }
     for job in active {

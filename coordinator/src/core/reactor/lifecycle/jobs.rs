@@ -14,7 +14,7 @@ use crate::core::failure::RunFailure;
 use crate::core::ids::JobId;
 use crate::core::job::{After, Job, Settled, Stage};
 use crate::core::notice::Notice;
-use crate::core::reactor::dispatch::{ahead, batches, proofs, speculation};
+use crate::core::reactor::dispatch::{ahead, batches, clearance, speculation};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
 use crate::store::{EndRecord, EvaluationRecord, JobRecord};
@@ -28,7 +28,7 @@ const STORED_TOGETHER_MAX: (usize, usize) = (256, 1 << 20);
 pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     let aside_min = turn.state.config.completed_aside_min;
     if let Some(attempt) = turn.state.jobs.get(&id).and_then(Job::evaluation).map(|it| it.attempt) {
-        proofs::clear(turn, id, attempt);
+        clearance::clear(turn, id, attempt);
     }
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;

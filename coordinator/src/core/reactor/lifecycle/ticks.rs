@@ -9,7 +9,7 @@ use crate::core::effect::{Effect, Record};
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::{Stage, sequence};
 use crate::core::notice::Notice;
-use crate::core::reactor::dispatch::{poison, proofs};
+use crate::core::reactor::dispatch::{clearance, poison};
 use crate::core::reactor::turn::Turn;
 use crate::core::saved::{self, SAVE_AFTER, SAVE_EVERY, SAVED_AT_ONCE_MAX};
 use crate::core::snapshot;
@@ -116,7 +116,7 @@ pub(crate) fn save_parts(turn: &mut Turn, before_stop: bool) {
     let age = if before_stop { Duration::ZERO } else { SAVE_AFTER };
     let most = if before_stop { u64::MAX } else { SAVED_AT_ONCE_MAX };
     for id in &turn.state.active {
-        let unproven = proofs::unproven_attempts(turn.state, *id, now);
+        let unproven = clearance::unproven_attempts(turn.state, *id, now);
         let Some(job) = turn.state.jobs.get_mut(id) else {
             continue;
         };
