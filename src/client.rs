@@ -350,13 +350,6 @@ impl Client {
         Ok(self.peer.answered(call).await?.jobs)
     }
 
-    /// Has an ended job computed again that a banned host contributed to; returns its state afterwards.
-    pub(crate) async fn recheck(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
-        let call = self.jobs.recheck(v1::RecheckRequest { job: job.to_owned() });
-        let snapshot = self.peer.answered(call).await?.snapshot;
-        self.present(snapshot, "snapshot")
-    }
-
     /// Cancels a job; returns its state afterwards.
     pub(crate) async fn cancel(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
         let call = self.jobs.cancel(v1::CancelRequest { job: job.to_owned() });

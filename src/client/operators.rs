@@ -7,7 +7,9 @@ use osteon_proto::endpoint::{self, ConnectError};
 use osteon_proto::malformed::Malformed;
 use osteon_proto::patience::Patience;
 use osteon_proto::v1::backup_response::Part;
-use osteon_proto::v1::{self, BackupEnd, ExplainResponse, ListWorkersResponse, WorkerSnapshot};
+use osteon_proto::v1::{
+    self, BackupEnd, ExplainResponse, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
+};
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
@@ -33,6 +35,13 @@ impl Client {
         let call = self.jobs.lift_ban(v1::LiftBanRequest { host: host.to_owned() });
         let worker = self.peer.answered(call).await?.worker;
         self.present(worker, "worker")
+    }
+
+    /// Has an ended job computed again that a banned host contributed to; returns its state afterwards.
+    pub(crate) async fn recheck(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
+        let call = self.jobs.recheck(v1::RecheckRequest { job: job.to_owned() });
+        let snapshot = self.peer.answered(call).await?.snapshot;
+        self.present(snapshot, "snapshot")
     }
 
     /// Drains a worker; returns its state afterwards.
