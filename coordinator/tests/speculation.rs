@@ -1,11 +1,6 @@
 //! Gain and cost of speculation, in virtual time.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test that cannot go on fails"
-)]
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot go on fails")]
 #![expect(clippy::print_stdout, reason = "what is measured stands in docs/searches.md")]
 
 #[expect(dead_code, reason = "each test file uses a part of it")]

@@ -1,12 +1,7 @@
 //! Delay caused by workers that send heartbeats and do not answer, in virtual time. Every result
 //! must equal that of a plain loop, to the bit.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test that cannot go on fails"
-)]
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that cannot go on fails")]
 
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod clockwork;
