@@ -1,6 +1,6 @@
 //! A first job file for a file of velocities, as people have them.
 //!
-//! How the file is written is found out by the reader of jobs ([`crate::velocities`]); here are added the
+//! How the file is written is found out by the reader of jobs (`velocities.rs`); here are added the
 //! columns of groups and subjects. What was understood is said in words, and written as keys of `[data]`,
 //! so that nothing is guessed again when the job is run.
 

@@ -13,6 +13,7 @@ use crate::arguments::InitArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::new_files::{self, NewFile};
 use crate::output;
+use crate::progress::say;
 use crate::resolved::OutputFormat;
 
 /// Job file without data, if no path is given.
@@ -39,7 +40,10 @@ pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFail
         None => FirstJob { text: init::without_data(), understood: Vec::new() },
     };
     let mut stdout = output::stdout(OutputFormat::Text);
+    let account = velocities.as_deref().map(|csv| account(csv, &first.understood));
     if is_printed {
+        // Beside the job, since what was taken for a velocity is always said.
+        account.iter().flat_map(|account| account.lines()).for_each(say);
         stdout.verbatim(&first.text).map_err(stdout_failure)?;
         // What is wrong with the values themselves is said of a printed job, too.
         if velocities.is_some() {
@@ -52,13 +56,7 @@ pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFail
         return Ok(ExitStatus::Done);
     }
     new_files::create(&[NewFile { path: path.clone(), text: first.text.into(), secret: false }])?;
-    let mut said = String::new();
-    if let Some(csv) = velocities {
-        said += &format!("{}\n", visible::path(csv));
-        for sentence in &first.understood {
-            said += &format!("  {sentence}\n");
-        }
-    }
+    let mut said = account.unwrap_or_default();
     let shown = visible::path(&path);
     said += &format!("wrote {shown}; next:\n");
     said += "  set the geometry of your device, and what you know of the bone, in that file\n";
@@ -74,6 +72,12 @@ pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFail
         })?;
     }
     Ok(ExitStatus::Done)
+}
+
+/// Returns what was understood of a file of velocities, a sentence in each line after that with its name.
+fn account(csv: &Path, understood: &[String]) -> String {
+    let sentences = understood.iter().map(|sentence| format!("  {sentence}\n"));
+    std::iter::once(format!("{}\n", visible::path(csv))).chain(sentences).collect()
 }
 
 /// Returns the name of a CSV file as a job file at `job` has to write it: relative to its directory if the
