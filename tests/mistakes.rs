@@ -150,7 +150,7 @@ const VELOCITIES: &[(&str, &str, Words)] = &[
     ("Velocity (m/s)\n3900\n3910\n", "", &["column"]),
     ("velocity\n3.9\n3.95\n3.8\n", "", &["did you mean 3.9 km/s (3.9e3)?"]),
     ("velocity\n3900\nNA\n3910\n", "", &["line 3", "missing"]),
-    ("velocity\nm/s\n3900\n3910\n", "", &["line 2"]),
+    ("velocity\nm/s\n3900\nabout 3910\n", "", &["line 4", "about 3910"]),
     ("velocity\n3900\n3950\n39000\n", "", &["line 4", "39000"]),
     ("velocity\n3900\n", "", &["velocities"]),
     ("velocity\n3900\n3900\n3900\n", "", &["velocities"]),

@@ -90,7 +90,7 @@ fn secrets(scratch: &Scratch) -> Vec<String> {
 
 /// The roles that may call each method of the services, and whether a certificate is sufficient.
 /// Methods that are not listed here, including new ones, may be called by admins only.
-const CALLERS: [(&str, &[&str], bool); 13] = [
+const CALLERS: [(&str, &[&str], bool); 14] = [
     ("/grpc.health.v1.Health/", &["none", "stranger", "read", "submit", "admin"], true),
     ("/grpc.reflection.v1.ServerReflection/", &["read", "submit", "admin"], true),
     ("/grpc.reflection.v1alpha.ServerReflection/", &["read", "submit", "admin"], true),
@@ -103,6 +103,7 @@ const CALLERS: [(&str, &[&str], bool); 13] = [
     ("/osteon.v1.Jobs/Fetch", &["read", "submit", "admin"], false),
     ("/osteon.v1.Jobs/Submit", &["submit", "admin"], false),
     ("/osteon.v1.Jobs/Cancel", &["submit", "admin"], false),
+    ("/osteon.v1.Jobs/Recheck", &["submit", "admin"], false),
     ("/osteon.v1.Workers/Attach", &[], true),
 ];
 
@@ -130,7 +131,7 @@ fn methods() -> Vec<(String, &'static [&'static str], bool)> {
             }
         }
     }
-    // Prune, DrainWorker and Backup are for admins; all others are listed.
+    // Prune, LiftBan, DrainWorker and Backup are for admins; all others are listed.
     assert!(methods.len() >= CALLERS.len() + 3, "{methods:?}");
     methods
 }
