@@ -195,8 +195,11 @@ pub(crate) fn tick(turn: &mut Turn) -> Vec<SetupKey> {
         for (name, sent) in &late {
             overdue::begin_probation(turn.state, name, *sent, turn.now);
         }
-        let is_undecided = ask_for_majority(turn, &setup);
-        if !late.is_empty() || is_undecided {
+        ask_for_majority(turn, &setup);
+        // A majority of votes that differ may come about when a worker leaves that was awaited.
+        let proofs = turn.state.proofs.of(&setup);
+        if !late.is_empty() || proofs.is_some_and(|proofs| proofs.ballot.contradiction().is_some())
+        {
             changed.push(setup);
         }
     }
@@ -204,9 +207,9 @@ pub(crate) fn tick(turn: &mut Turn) -> Vec<SetupKey> {
 }
 
 /// Asks further hosts where those asked have no majority. Notes since when there is none.
-fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) -> bool {
+fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) {
     let Some(proofs) = turn.state.proofs.of(setup) else {
-        return false;
+        return;
     };
     let voters = voters(turn.state, setup, turn.now);
     let voted = proofs.ballot.count();
@@ -217,7 +220,7 @@ fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) -> bool {
         proofs.undecided_since = undecided.then(|| proofs.undecided_since.unwrap_or(now));
     }
     if voted < 2 || voters > voted || lacks == 0 {
-        return false;
+        return;
     }
     let job = turn
         .state
@@ -225,8 +228,7 @@ fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) -> bool {
         .iter()
         .find(|id| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup));
     let Some(job) = job.copied() else {
-        return false;
+        return;
     };
     proofs::ask_further(turn, job, voted + lacks);
-    true
 }
