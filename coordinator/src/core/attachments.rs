@@ -12,20 +12,23 @@ const BURST: f64 = 512.0;
 /// Number of further attachments per second.
 const PER_SECOND: f64 = 8.0;
 
-/// Attachments of the last minute, by host.
+/// What the hosts that attached in the last minute are still allowed, by host.
 #[derive(Debug, Default)]
-pub(crate) struct Attachments(BTreeMap<String, Recent>);
+pub(crate) struct Attachments(BTreeMap<String, Allowance>);
 
-/// What is left of a host's burst.
+/// How many more times a host could attach after its last attempt.
 #[derive(Debug, Clone, Copy)]
-struct Recent {
-    left: f64,
+struct Allowance {
+    attachments: f64,
+    /// Time of the last attempt.
     at: Duration,
 }
 
-impl Recent {
-    fn left(self, now: Duration) -> f64 {
-        (self.left + PER_SECOND * now.saturating_sub(self.at).as_secs_f64()).min(BURST)
+impl Allowance {
+    /// Returns how many times the host may attach at `now`.
+    fn attachments_at(self, now: Duration) -> f64 {
+        let regained = PER_SECOND * now.saturating_sub(self.at).as_secs_f64();
+        (self.attachments + regained).min(BURST)
     }
 }
 
@@ -33,15 +36,15 @@ impl Attachments {
     /// Counts an attachment of a host; returns whether it is one too many.
     pub(crate) fn exceed(&mut self, host: &str, now: Duration) -> bool {
         if self.0.len() >= WORKERS_MAX && !self.0.contains_key(host) {
-            self.0.retain(|_, recent| recent.left(now) < BURST);
+            self.0.retain(|_, allowance| allowance.attachments_at(now) < BURST);
             if self.0.len() >= WORKERS_MAX {
                 self.0.pop_first();
             }
         }
-        let left = self.0.get(host).map_or(BURST, |recent| recent.left(now));
-        let exceeds = left < 1.0;
-        let left = if exceeds { left } else { left - 1.0 };
-        self.0.insert(host.to_owned(), Recent { left, at: now });
+        let allowed = self.0.get(host).map_or(BURST, |allowance| allowance.attachments_at(now));
+        let exceeds = allowed < 1.0;
+        let attachments = if exceeds { allowed } else { allowed - 1.0 };
+        self.0.insert(host.to_owned(), Allowance { attachments, at: now });
         exceeds
     }
 }

@@ -68,7 +68,11 @@ pub(crate) fn choose(
 }
 
 /// Returns how many realizations a worker with `slots` slots computes until the first ones are audited.
-pub(crate) fn first((key, fraction): (&AuditKey, f64), lease: LeaseId, slots: u32) -> f64 {
+pub(crate) fn draw_first_distance(
+    (key, fraction): (&AuditKey, f64),
+    lease: LeaseId,
+    slots: u32,
+) -> f64 {
     distance(fraction, slots.into(), uniform(key, [lease.0, 0, 2]))
 }
 
@@ -118,7 +122,7 @@ mod tests {
     /// Returns the fraction of the realizations that is audited, and the most that a worker computes between
     /// two audits, over many batches of this size.
     fn audited(fraction: f64, slots: u32, count: u64) -> (f64, u64) {
-        let first = first((&AuditKey([7; 32]), fraction), LeaseId(1), slots);
+        let first = draw_first_distance((&AuditKey([7; 32]), fraction), LeaseId(1), slots);
         let (mut left, mut audited, mut since, mut longest) = (first, 0, 0, 0);
         let batches = 400_000 / count;
         for batch in 0..batches {

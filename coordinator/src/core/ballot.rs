@@ -59,7 +59,7 @@ pub(crate) struct Ballot {
     indices: Indices,
     /// The answers that differ, in the order they arrived, with the number of hosts that gave each.
     answers: Vec<(Vec<RealizationResult>, usize)>,
-    /// Of each host the worker that voted first, and the place of its answer.
+    /// By host: the worker whose answer is the host's vote, and the index of that answer in `answers`.
     votes: BTreeMap<String, (WorkerName, usize)>,
 }
 

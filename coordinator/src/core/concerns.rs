@@ -1,6 +1,5 @@
-//! What an operator should know before something is refused: bounds that are half used up, a store that
-//! refuses records, and a log that only grows. The log of the coordinator says it once, the list of jobs and the live
-//! page as long as it lasts.
+//! Warnings for the operator: a bound is half used up, the store refuses records, or its log only grows. The
+//! coordinator's log says each once; the list of jobs and the live page show it as long as it lasts.
 
 use std::fmt;
 use std::time::Duration;
@@ -14,7 +13,7 @@ use crate::core::state::State;
 const LOG_PATIENCE: Duration = Duration::from_secs(60);
 const MIB: u64 = 1 << 20;
 
-/// What an operator should know.
+/// A state of the service that the operator is warned of.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Concern {
     /// At least half of what is allowed is used.

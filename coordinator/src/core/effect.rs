@@ -212,7 +212,7 @@ pub enum Answer {
         /// Last job of the page, if there are more.
         more_after: Option<JobId>,
     },
-    /// What an operator should know, as sentences.
+    /// The present warnings for the operator, as sentences.
     Concerns(Vec<String>),
     /// The search of a job that has not ended.
     Followed(SearchRows),

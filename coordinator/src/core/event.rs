@@ -167,7 +167,7 @@ pub enum Request {
     },
     /// Get a snapshot of a job.
     Get(JobId),
-    /// What an operator should know, for people.
+    /// List the present warnings for the operator, as sentences.
     Concerns,
     /// Explain what decides how fast a job is.
     Explain(JobId),

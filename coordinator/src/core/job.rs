@@ -71,7 +71,7 @@ pub(crate) struct Job {
     /// Requests that are answered when the current record is durable: submissions at first,
     /// cancellations at the end.
     pub(crate) pending_replies: Vec<ReplyId>,
-    /// What was found out about the hosts of an earlier result of it.
+    /// The bans of hosts that computed a part of an earlier result of it.
     pub(crate) doubts: Doubts,
     /// The store's refusal of the current record.
     pub(crate) store_retry: Option<StoreRetry>,
@@ -83,7 +83,7 @@ impl Job {
     pub(crate) fn new(record: JobRecord, stage: Stage, stored: u64, now: Duration) -> Self {
         Self {
             identity: identity(&record.specification),
-            setup: SetupKey::of(&record.specification),
+            setup: SetupKey::from_specification(&record.specification),
             bytes: bytes(&record.specification),
             search: Search::new(record.specification.clone()),
             ahead: Ahead::default(),
@@ -152,6 +152,16 @@ impl Job {
             _ => None,
         };
         asked_for.into_iter().chain(self.ahead.evaluations_mut())
+    }
+
+    /// Returns the one of [`Job::certain`] with this attempt.
+    pub(crate) fn certain_with(&self, attempt: u64) -> Option<&PendingEvaluation> {
+        self.certain().find(|evaluation| evaluation.attempt == attempt)
+    }
+
+    /// As [`Job::certain_with`].
+    pub(crate) fn certain_with_mut(&mut self, attempt: u64) -> Option<&mut PendingEvaluation> {
+        self.certain_mut().find(|evaluation| evaluation.attempt == attempt)
     }
 
     /// As [`Job::evaluations`].

@@ -42,7 +42,7 @@ pub struct SetupKey([u8; 32]);
 
 impl SetupKey {
     /// Returns the key of a job's setup.
-    pub(crate) fn of(specification: &JobSpecification) -> Self {
+    pub(crate) fn from_specification(specification: &JobSpecification) -> Self {
         let setup = EvaluationInput {
             id: 0,
             setup: specification.setup,
@@ -118,12 +118,12 @@ pub(crate) struct Proofs(BTreeMap<SetupKey, SetupProofs>);
 
 impl Proofs {
     /// Returns the proofs of a setup.
-    pub(crate) fn of(&self, setup: &SetupKey) -> Option<&SetupProofs> {
+    pub(crate) fn for_setup(&self, setup: &SetupKey) -> Option<&SetupProofs> {
         self.0.get(setup)
     }
 
-    /// As [`Proofs::of`].
-    pub(crate) fn of_mut(&mut self, setup: &SetupKey) -> Option<&mut SetupProofs> {
+    /// As [`Proofs::for_setup`].
+    pub(crate) fn for_setup_mut(&mut self, setup: &SetupKey) -> Option<&mut SetupProofs> {
         self.0.get_mut(setup)
     }
 

@@ -297,7 +297,7 @@ fn check_batches(state: &State) -> Result<(), Inconsistency> {
             continue;
         }
         let job = state.jobs.get(&batch.assignment.job);
-        let asked_for = job.is_some_and(|job| job.certain().any(|it| it.attempt == attempt));
+        let asked_for = job.is_some_and(|job| job.certain_with(attempt).is_some());
         let speculative = job
             .is_some_and(|job| job.speculation.evaluations.iter().any(|it| it.attempt == attempt));
         if asked_for == speculative || (batch.purpose == Purpose::Speculative) != speculative {

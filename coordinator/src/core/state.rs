@@ -318,6 +318,12 @@ impl State {
         job.evaluations_mut().find(|found| found.attempt == assignment.attempt)
     }
 
+    /// Returns the point of an assignment's realizations, while its evaluation is under way, or its proof.
+    pub(crate) fn point_of(&self, assignment: &Assignment) -> Option<Point> {
+        let of_proof = || Some(self.proofs.with_attempt(assignment.attempt)?.1.point());
+        self.evaluation_of(assignment).map(|it| it.point).or_else(of_proof)
+    }
+
     /// Returns a number for the next attempt at an evaluation.
     pub(crate) fn new_attempt(&mut self) -> u64 {
         self.next_attempt += 1;
@@ -327,8 +333,8 @@ impl State {
     /// Returns the ban of a host that has not been lifted.
     pub(crate) fn ban(&self, host: &str) -> Option<&BanRecord> {
         let of_host = |banned: &&Banned| banned.record.worker.host() == host;
-        let records = self.banned.iter().filter(of_host).map(|banned| &banned.record);
-        records.into_iter().find(|record| record.lifted.is_none())
+        let mut records = self.banned.iter().filter(of_host).map(|banned| &banned.record);
+        records.find(|record| record.lifted.is_none())
     }
 
     /// Returns the host of the ban with this number.
@@ -345,6 +351,12 @@ impl State {
                 && (record.lifted.is_none() || record.at >= job.accepted)
         };
         self.banned.iter().any(|banned| concerns(&banned.record))
+    }
+
+    /// Returns the first running job with a setup.
+    pub(crate) fn active_job_of(&self, setup: &SetupKey) -> Option<JobId> {
+        let of_setup = |id: &&JobId| self.jobs.get(id).is_some_and(|job| job.setup == *setup);
+        self.active.iter().find(of_setup).copied()
     }
 
     /// Returns whether any ban is not durable yet.

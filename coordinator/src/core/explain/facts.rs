@@ -123,7 +123,8 @@ impl JobFacts {
             facts.queued = evaluation.queued();
             facts.quarantined = evaluation.quarantine.len() as u64;
             let disputes = evaluation.disputes.iter().map(|dispute| since(dispute.since));
-            let proofs = state.proofs.of(&job.setup).and_then(|proofs| proofs.undecided_since);
+            let proofs =
+                state.proofs.for_setup(&job.setup).and_then(|proofs| proofs.undecided_since);
             facts.disputed = disputes.chain(proofs.map(since)).max();
         }
         facts.compare(state, job);

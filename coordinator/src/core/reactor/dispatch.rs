@@ -110,9 +110,7 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
     } else {
         return None;
     };
-    let mut evaluations = turn.state.jobs.get_mut(&job)?.certain_mut();
-    let indices = evaluations.find(|it| it.attempt == attempt)?.take(size)?;
-    drop(evaluations);
+    let indices = turn.state.jobs.get_mut(&job)?.certain_with_mut(attempt)?.take(size)?;
     turn.state.last_served = Some(job);
     ahead::refresh(turn, job);
     let assignment = Assignment { job, attempt, indices };

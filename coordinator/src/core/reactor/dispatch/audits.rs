@@ -55,8 +55,7 @@ fn audit_for(
         let waiting = all.map(|audit| audit.indices.count).sum();
         sizing::audit_size(state.workers.get(&worker)?, job, fleet, (audited, waiting))
     };
-    let mut evaluations = state.jobs.get_mut(&job)?.certain_mut();
-    let evaluation = evaluations.find(|evaluation| evaluation.attempt == attempt)?;
+    let evaluation = state.jobs.get_mut(&job)?.certain_with_mut(attempt)?;
     evaluation.audits_out += 1;
     let audit = evaluation.audits.get_mut(at)?;
     let part = Audit { indices: audit.indices.take(most), ..audit.clone() };

@@ -4,29 +4,14 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use super::{overdue, proofs};
+use super::{overdue, proofs, votes};
 use crate::core::audit;
 use crate::core::evaluation::{Audit, PendingEvaluation};
 use crate::core::ids::{BatchId, JobId, WorkerId};
-use crate::core::job::Job;
 use crate::core::proofs::SetupKey;
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
 use crate::core::worker_name::WorkerName;
-
-/// Returns the number of hosts whose votes on a setup count: those that have voted, and those whose
-/// answers are on their way.
-pub(crate) fn voters(state: &State, setup: &SetupKey, now: Duration) -> usize {
-    let Some(proofs) = state.proofs.of(setup) else {
-        return 0;
-    };
-    if proofs.out.is_empty() {
-        return proofs.ballot.count();
-    }
-    let awaited = proofs.out.iter().filter(|(_, batch)| !overdue::is_overdue(state, **batch, now));
-    let awaited = awaited.filter_map(|(id, _)| Some(state.workers.get(id)?.name.host()));
-    awaited.chain(proofs.ballot.hosts()).collect::<BTreeSet<_>>().len()
-}
 
 /// Returns the attempts at evaluations of a job whose results come from workers without a proof that the
 /// majority confirms. They are not saved: after a restart nobody would know that they do not count yet.
@@ -34,10 +19,10 @@ pub(crate) fn unproven_attempts(state: &State, job: JobId, now: Duration) -> BTr
     let Some(job) = state.jobs.get(&job) else {
         return BTreeSet::new();
     };
-    let Some(proofs) = state.proofs.of(&job.setup) else {
+    let Some(proofs) = state.proofs.for_setup(&job.setup) else {
         return BTreeSet::new();
     };
-    let voters = voters(state, &job.setup, now);
+    let voters = votes::proof_voters(state, &job.setup, now);
     let confirms =
         |name: &WorkerName| proofs.is_given_by(name) && proofs.ballot.confirms(name.host(), voters);
     let unproven = job.certain().filter(|evaluation| !evaluation.workers.iter().all(confirms));
@@ -57,7 +42,7 @@ enum Need {
 
 /// Decides whether the results of a complete evaluation may count, and asks for what is missing.
 pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
-    let found = turn.state.jobs.get(&id).and_then(|job| Some((job, of_attempt(job, attempt)?)));
+    let found = turn.state.jobs.get(&id).and_then(|job| Some((job, job.certain_with(attempt)?)));
     let Some((job, evaluation)) = found else {
         return;
     };
@@ -66,7 +51,7 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
     }
     let setup = job.setup;
     let state = &*turn.state;
-    let voters = voters(state, &setup, turn.now);
+    let voters = votes::proof_voters(state, &setup, turn.now);
     let names = evaluation.workers.iter().enumerate();
     let needs: Vec<(usize, Need)> = names
         .map(|(place, name)| {
@@ -86,7 +71,7 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    let Some(evaluation) = of_attempt_mut(job, attempt) else {
+    let Some(evaluation) = job.certain_with_mut(attempt) else {
         return;
     };
     for place in audited {
@@ -104,7 +89,7 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
 fn audit_last_answers(turn: &mut Turn, id: JobId, attempt: u64) {
     let (key, fraction) = (turn.state.config.audit_key, turn.state.config.audit_fraction);
     let state = &*turn.state;
-    let Some(evaluation) = state.jobs.get(&id).and_then(|job| of_attempt(job, attempt)) else {
+    let Some(evaluation) = state.jobs.get(&id).and_then(|job| job.certain_with(attempt)) else {
         return;
     };
     if evaluation.workers.len() as f64 > fraction * evaluation.realizations() as f64 {
@@ -117,19 +102,11 @@ fn audit_last_answers(turn: &mut Turn, id: JobId, attempt: u64) {
     let due: Vec<(usize, WorkerName)> = due.map(|(place, name)| (place, name.clone())).collect();
     for (place, name) in due {
         let job = turn.state.jobs.get_mut(&id);
-        if let Some(evaluation) = job.and_then(|job| of_attempt_mut(job, attempt)) {
+        if let Some(evaluation) = job.and_then(|job| job.certain_with_mut(attempt)) {
             audit_last(evaluation, place, Some(&key));
             turn.state.count_checked(&name, 1);
         }
     }
-}
-
-fn of_attempt(job: &Job, attempt: u64) -> Option<&PendingEvaluation> {
-    job.certain().find(|evaluation| evaluation.attempt == attempt)
-}
-
-fn of_attempt_mut(job: &mut Job, attempt: u64) -> Option<&mut PendingEvaluation> {
-    job.certain_mut().find(|evaluation| evaluation.attempt == attempt)
 }
 
 /// Returns what the results of the worker at a place of an evaluation need.
@@ -140,7 +117,7 @@ fn need(
     (setup, voters): (&SetupKey, usize),
     now: Duration,
 ) -> Need {
-    let Some(proofs) = state.proofs.of(setup) else {
+    let Some(proofs) = state.proofs.for_setup(setup) else {
         // As long as all workers are of one host, nothing can be compared.
         return Need::Nothing;
     };
@@ -175,60 +152,43 @@ fn audit_last(evaluation: &mut PendingEvaluation, place: usize, one: Option<&aud
     evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
 }
 
-/// Puts workers on probation that do not answer, and asks further hosts where no answer has a majority. Returns
-/// the setups of which something may have been decided.
-pub(crate) fn tick(turn: &mut Turn) -> Vec<SetupKey> {
-    let mut changed = Vec::new();
-    let setups: Vec<SetupKey> = turn.state.proofs.setups().copied().collect();
-    for setup in setups {
-        let Some(proofs) = turn.state.proofs.of(&setup) else {
-            continue;
-        };
-        let late =
-            |(_, batch): &(&WorkerId, &BatchId)| overdue::is_overdue(turn.state, **batch, turn.now);
-        let names = proofs.out.iter().filter(late).filter_map(|(worker, batch)| {
-            let sent = turn.state.batches.get(batch)?.sent;
-            Some((turn.state.workers.get(worker)?.name.clone(), sent))
-        });
-        let late: Vec<(WorkerName, Duration)> = names.collect();
-        // The batch stays with the worker: it may be slow, and its answer ends the probation.
-        for (name, sent) in &late {
-            overdue::begin_probation(turn.state, name, *sent, turn.now);
-        }
-        ask_for_majority(turn, &setup);
-        // A majority of votes that differ may come about when a worker leaves that was awaited.
-        let proofs = turn.state.proofs.of(&setup);
-        if !late.is_empty() || proofs.is_some_and(|proofs| proofs.ballot.contradiction().is_some())
-        {
-            changed.push(setup);
-        }
+/// Puts workers on probation that do not give their proof of a setup, and asks further hosts where no answer has a
+/// majority.
+pub(crate) fn look_for_majority(turn: &mut Turn, setup: &SetupKey) {
+    let Some(proofs) = turn.state.proofs.for_setup(setup) else {
+        return;
+    };
+    let late =
+        |(_, batch): &(&WorkerId, &BatchId)| overdue::is_overdue(turn.state, **batch, turn.now);
+    let names = proofs.out.iter().filter(late).filter_map(|(worker, batch)| {
+        let sent = turn.state.batches.get(batch)?.sent;
+        Some((turn.state.workers.get(worker)?.name.clone(), sent))
+    });
+    let late: Vec<(WorkerName, Duration)> = names.collect();
+    // The batch stays with the worker: it may be slow, and its answer ends the probation.
+    for (name, sent) in &late {
+        overdue::begin_probation(turn.state, name, *sent, turn.now);
     }
-    changed
+    ask_for_majority(turn, setup);
 }
 
 /// Asks further hosts where those asked have no majority. Notes since when there is none.
 fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) {
-    let Some(proofs) = turn.state.proofs.of(setup) else {
+    let Some(proofs) = turn.state.proofs.for_setup(setup) else {
         return;
     };
-    let voters = voters(turn.state, setup, turn.now);
+    let voters = votes::proof_voters(turn.state, setup, turn.now);
     let voted = proofs.ballot.count();
     let lacks = proofs.ballot.lacks(voters);
     let now = turn.now;
-    if let Some(proofs) = turn.state.proofs.of_mut(setup) {
+    if let Some(proofs) = turn.state.proofs.for_setup_mut(setup) {
         let undecided = voted > 1 && lacks > 0;
         proofs.undecided_since = undecided.then(|| proofs.undecided_since.unwrap_or(now));
     }
     if voted < 2 || voters > voted || lacks == 0 {
         return;
     }
-    let job = turn
-        .state
-        .active
-        .iter()
-        .find(|id| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup));
-    let Some(job) = job.copied() else {
-        return;
-    };
-    proofs::ask_further(turn, job, voted + lacks);
+    if let Some(job) = turn.state.active_job_of(setup) {
+        proofs::ask_further(turn, job, voted + lacks);
+    }
 }

@@ -17,7 +17,8 @@ pub(crate) fn replace(turn: &mut Turn, (id, point): (JobId, Point), index: u64, 
     let Some(input) = turn.state.input(id, attempt, point) else {
         return;
     };
-    let out = turn.state.proofs.of(&setup).map(|proofs| proofs.out.clone()).unwrap_or_default();
+    let out =
+        turn.state.proofs.for_setup(&setup).map(|proofs| proofs.out.clone()).unwrap_or_default();
     for batch in out.into_values() {
         batches::revoke(turn, batch);
     }

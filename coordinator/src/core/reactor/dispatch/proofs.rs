@@ -21,7 +21,7 @@ pub(crate) fn ask_before(turn: &mut Turn, worker: WorkerId, job: JobId) {
     if turn.state.workers.get(&worker).is_none_or(is_proven) {
         return;
     }
-    if turn.state.proofs.of(&setup).is_none() {
+    if turn.state.proofs.for_setup(&setup).is_none() {
         if !turn.state.several_hosts() || !begin(turn, job, setup) {
             return;
         }
@@ -54,7 +54,7 @@ pub(super) fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) {
     let Some(setup) = turn.state.jobs.get(&job).map(|job| job.setup) else {
         return;
     };
-    let Some(proofs) = turn.state.proofs.of(&setup) else {
+    let Some(proofs) = turn.state.proofs.for_setup(&setup) else {
         return;
     };
     let state = &*turn.state;
@@ -78,7 +78,7 @@ pub(super) fn ask(turn: &mut Turn, worker: WorkerId, job: JobId) {
         return;
     };
     turn.state.proofs.touch(&setup, turn.now);
-    let Some(proofs) = turn.state.proofs.of(&setup) else {
+    let Some(proofs) = turn.state.proofs.for_setup(&setup) else {
         return;
     };
     if proofs.out.contains_key(&worker) {
@@ -95,7 +95,7 @@ pub(super) fn ask(turn: &mut Turn, worker: WorkerId, job: JobId) {
     if let Some(attached) = turn.state.workers.get_mut(&worker) {
         attached.proofs.push(batch);
     }
-    if let Some(proofs) = turn.state.proofs.of_mut(&setup) {
+    if let Some(proofs) = turn.state.proofs.for_setup_mut(&setup) {
         proofs.out.insert(worker, batch);
     }
     turn.effects.push(Effect::Send { worker, batch, work });

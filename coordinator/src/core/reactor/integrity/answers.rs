@@ -152,9 +152,7 @@ fn implausible(
     solved: &[RealizationResult],
 ) -> Option<CloseReason> {
     let layers = &state.jobs.get(&assignment.job)?.record.specification.setup.layers;
-    let of_proof = || Some(state.proofs.with_attempt(assignment.attempt)?.1.point());
-    let point = state.evaluation_of(assignment).map(|it| it.point).or_else(of_proof)?;
-    let carried = carried_velocities(layers, &point)?;
+    let carried = carried_velocities(layers, &state.point_of(assignment)?)?;
     let mut velocities = solved.iter().filter_map(|one| one.outcome.ok());
     let velocity = velocities.find(|velocity| !carried.contains(velocity))?;
     Some(CloseReason::ImpossibleVelocity { velocity })

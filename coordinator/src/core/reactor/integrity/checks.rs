@@ -4,7 +4,6 @@
 use std::time::Duration;
 
 use osteon_common::outcome::RealizationResult;
-use osteon_common::parameters::{BONE_PARAMETERS, Point};
 
 use super::bans;
 use crate::core::audit;
@@ -69,7 +68,7 @@ pub(crate) fn compare(
         let mut ballot = Ballot::new(indices);
         for vote in votes {
             if let Cast::Contradicts(found) = ballot.cast(vote) {
-                contradicts_itself(turn, assignment.job, by, *found);
+                contradicts_itself(turn, assignment, by, *found);
             }
         }
         return;
@@ -90,7 +89,7 @@ pub(crate) fn compare(
 /// fails instead: nobody could compute it.
 pub(crate) fn contradicts_itself(
     turn: &mut Turn,
-    job: JobId,
+    assignment: &Assignment,
     by: &WorkerName,
     contradiction: Contradiction,
 ) {
@@ -98,12 +97,10 @@ pub(crate) fn contradicts_itself(
     if turn.state.several_hosts() {
         let what = format!("{} and as {}", shown(earlier), shown(later));
         let reason = format!("answered realization {} as {what}", contradiction.index);
-        bans::ban(turn, by, job, reason);
-    } else {
-        let point = turn.state.jobs.get(&job).map(|job| job.record.specification.start());
-        let point = point.unwrap_or_else(|| Point::of_bone([0.0; BONE_PARAMETERS]));
+        bans::ban(turn, by, assignment.job, reason);
+    } else if let Some(point) = turn.state.point_of(assignment) {
         let contradiction = Box::new(contradiction);
-        jobs::fail(turn, job, &RunFailure::Contradiction { contradiction, point });
+        jobs::fail(turn, assignment.job, &RunFailure::Contradiction { contradiction, point });
     }
 }
 
@@ -123,7 +120,7 @@ pub(crate) fn proven(
     if let Some(attached) = turn.state.workers.get_mut(&worker) {
         attached.proven.insert(setup);
     }
-    let Some(proofs) = turn.state.proofs.of_mut(&setup) else {
+    let Some(proofs) = turn.state.proofs.for_setup_mut(&setup) else {
         return;
     };
     let count = proofs.indices().count;
@@ -132,26 +129,32 @@ pub(crate) fn proven(
     turn.state.count_checked(by, count);
     match cast {
         Cast::Counted => decide_proofs(turn, &setup),
-        Cast::Contradicts(found) => contradicts_itself(turn, assignment.job, by, *found),
+        Cast::Contradicts(found) => contradicts_itself(turn, assignment, by, *found),
     }
 }
 
 /// Bans the hosts whose proofs of a setup differ from that of the majority, and lets evaluations continue
 /// that waited for it.
 pub(crate) fn decide_proofs(turn: &mut Turn, setup: &SetupKey) {
-    let voters = clearance::voters(turn.state, setup, turn.now);
-    let verdict = turn.state.proofs.of(setup).and_then(|proofs| proofs.ballot.verdict(voters));
+    ban_outvoted_by_proofs(turn, setup);
     let of_setup = |id: &&JobId| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup);
     let jobs: Vec<JobId> = turn.state.active.iter().filter(of_setup).copied().collect();
-    if let Some((verdict, job)) = verdict.zip(jobs.first()) {
-        ban_outvoted(turn, *job, verdict);
-    }
     for id in jobs {
         let attempts = turn.state.jobs.get(&id).into_iter().flat_map(Job::certain);
         let attempts: Vec<u64> = attempts.map(|evaluation| evaluation.attempt).collect();
         for attempt in attempts {
             jobs::settle(turn, id, attempt);
         }
+    }
+}
+
+/// Bans the hosts whose proofs of a setup differ from that of the majority.
+fn ban_outvoted_by_proofs(turn: &mut Turn, setup: &SetupKey) {
+    let voters = votes::proof_voters(turn.state, setup, turn.now);
+    let proofs = turn.state.proofs.for_setup(setup);
+    let verdict = proofs.and_then(|proofs| proofs.ballot.verdict(voters));
+    if let Some((verdict, job)) = verdict.zip(turn.state.active_job_of(setup)) {
+        ban_outvoted(turn, job, verdict);
     }
 }
 
@@ -172,7 +175,7 @@ pub(crate) fn tie_broken(
     };
     match evaluation.disputes[at].ballot.cast(Vote { by: by.clone(), solved }) {
         Cast::Counted => decide_dispute(turn, assignment.job, assignment.attempt, at),
-        Cast::Contradicts(found) => contradicts_itself(turn, assignment.job, by, *found),
+        Cast::Contradicts(found) => contradicts_itself(turn, assignment, by, *found),
     }
 }
 
@@ -184,7 +187,7 @@ fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
         return;
     };
     let is_late = |batch| overdue::is_overdue(turn.state, batch, turn.now);
-    let voters = votes::voters(turn.state, dispute, is_late);
+    let voters = votes::dispute_voters(turn.state, dispute, is_late);
     let Some(verdict) = dispute.ballot.verdict(voters) else {
         return;
     };
@@ -231,8 +234,11 @@ pub(crate) fn give_up(turn: &mut Turn) {
         return;
     }
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
-    for setup in clearance::tick(turn) {
-        decide_proofs(turn, &setup);
+    let setups: Vec<SetupKey> = turn.state.proofs.setups().copied().collect();
+    for setup in setups {
+        clearance::look_for_majority(turn, &setup);
+        // A worker may have left that was awaited, so that the votes have a majority now.
+        ban_outvoted_by_proofs(turn, &setup);
     }
     for job in active {
         // Hosts may have left whose votes a dispute waited for.
@@ -266,8 +272,8 @@ fn give_up_audits(state: &mut State, id: JobId) -> Vec<u64> {
     let pending: Vec<_> = with.map(|it| (it.attempt, std::mem::take(&mut it.audits))).collect();
     for (attempt, mut audits) in pending {
         audits.retain(|audit| state.can_check(audit.by.host()));
-        let mut evaluations = state.jobs.get_mut(&id).into_iter().flat_map(Job::certain_mut);
-        if let Some(evaluation) = evaluations.find(|it| it.attempt == attempt) {
+        let job = state.jobs.get_mut(&id);
+        if let Some(evaluation) = job.and_then(|job| job.certain_with_mut(attempt)) {
             evaluation.audits = audits;
         }
     }
@@ -279,7 +285,7 @@ fn give_up_audits(state: &mut State, id: JobId) -> Vec<u64> {
 fn undecided(state: &State, job: JobId, now: Duration) -> Option<(RunFailure, Option<Ballot>)> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let setup = state.jobs.get(&job)?.setup;
-    if let Some(proofs) = state.proofs.of(&setup)
+    if let Some(proofs) = state.proofs.for_setup(&setup)
         && let Some(since) = proofs.undecided_since
         && now.saturating_sub(since)
             > state.config.expiry * if proofs.out.is_empty() { 1 } else { 2 }

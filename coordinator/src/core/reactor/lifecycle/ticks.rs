@@ -153,7 +153,7 @@ pub(crate) fn store_pieces(turn: &mut Turn) {
     }
 }
 
-/// Tells the log what an operator should know.
+/// Writes new warnings for the operator to the log.
 pub(crate) fn tell_concerns(turn: &mut Turn) {
     if turn.now.saturating_sub(turn.state.condition.looked) < PUBLISH_EVERY {
         return;

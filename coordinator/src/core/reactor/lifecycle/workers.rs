@@ -35,7 +35,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
     let lease = LeaseId(turn.state.next_lease);
     turn.state.next_lease += 1;
     let audits = (&turn.state.config.audit_key, turn.state.config.audit_fraction);
-    let until_audit = audit::first(audits, lease, hello.slots);
+    let until_audit = audit::draw_first_distance(audits, lease, hello.slots);
     let name = name(&hello);
     poison::forget_crashes(turn.state, &name);
     if turn.state.probation.attach(&name, turn.now) {
