@@ -27,7 +27,7 @@ pub(crate) struct ResultOrigin<'a> {
     pub(crate) digest: Option<&'a str>,
     /// Seed of the germs, if any were drawn.
     pub(crate) seed: Option<u64>,
-    /// What was found out later about the hosts that computed it.
+    /// Set if a host that computed a part of the result was banned after the job had ended.
     pub(crate) integrity: Option<&'a IntegrityReport>,
 }
 

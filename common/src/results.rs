@@ -254,11 +254,11 @@ pub struct JobResult {
     pub picking: Picking,
     /// The program that computed it.
     pub program: Program,
-    /// What was found out later about the hosts that computed it; `None` if nothing was.
+    /// Set if a host that computed a part of the result was banned after the job had ended.
     pub integrity: Option<Integrity>,
 }
 
-/// What was found out about the hosts of a job after it had ended.
+/// States that hosts which computed a part of a result were banned for wrong answers after the job had ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Integrity {
     /// Hosts that computed a part of the job, and were banned for wrong answers after it had ended.

@@ -49,7 +49,7 @@ pub struct FirstJob {
 pub fn of_csv(path: &Path, name: &str) -> Result<FirstJob, InitError> {
     let refused = |problems| InitError { problems };
     let table = velocities::understand(path).map_err(refused)?;
-    let roles = Roles::of(&table);
+    let roles = Roles::from_table(&table);
     let measured = velocities::of_table(path, &table, &roles.named()).map_err(refused)?;
     let mut understood = vec![table.described()];
     understood.extend(measured.account.described(table.missing()));

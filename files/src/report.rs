@@ -114,7 +114,7 @@ impl ResultFile {
         }
     }
 
-    /// What was found out later about the hosts that computed it; `None` if nothing was.
+    /// Set if a host that computed a part of the result was banned after the job had ended.
     pub fn integrity(&self) -> Option<&IntegrityReport> {
         match self {
             Self::Identification(result) => result.integrity.as_ref(),

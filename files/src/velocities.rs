@@ -145,7 +145,7 @@ fn gather(
     let gathered = CollectedVelocities::new(named.subject.is_some(), table);
     let mut reading =
         RowReading { table, columns, gathered, problems: Vec::new(), below: Vec::new() };
-    for line in TableLines::of(&table.content.text, &table.header, Some(table.place())) {
+    for line in TableLines::after_header(&table.content.text, &table.header, Some(table.place())) {
         let read =
             line.map_err(|(line, problem)| (line, problem, true)).and_then(|(number, line)| {
                 reading.line(number, line).map_err(|problem| {

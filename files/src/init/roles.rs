@@ -43,7 +43,7 @@ pub(super) struct NameColumn {
 
 impl Roles {
     /// Returns the columns' roles.
-    pub(super) fn of(table: &VelocityTable) -> Self {
+    pub(super) fn from_table(table: &VelocityTable) -> Self {
         let columns = named_columns(table);
         let first = |is_group| columns.iter().find(|column| column.is_group == is_group).cloned();
         let (group, subject) = match (first(true), first(false)) {

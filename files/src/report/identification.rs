@@ -119,7 +119,7 @@ pub struct Identification {
     /// The commit that the program was built from, with `-dirty` behind it if the sources were
     /// modified; null if it was built outside a repository.
     pub commit: Option<String>,
-    /// What was found out later about the hosts that computed it; only if something was.
+    /// Only if a host that computed a part of the result was banned after the job had ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub integrity: Option<IntegrityReport>,
 }
@@ -183,7 +183,7 @@ impl From<&JobResult> for Identification {
             version: result.program.version.clone(),
             numerics: result.program.numerics,
             commit: result.program.commit.clone(),
-            integrity: IntegrityReport::of(result),
+            integrity: IntegrityReport::from_result(result),
         }
     }
 }

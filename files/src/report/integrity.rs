@@ -1,4 +1,4 @@
-//! What was found out about the hosts of a job after it had ended.
+//! States in result files that hosts which computed a part of a result were banned after the job had ended.
 
 use osteon_common::results::{Integrity, JobResult};
 use schemars::JsonSchema;
@@ -20,8 +20,8 @@ pub struct IntegrityReport {
 }
 
 impl IntegrityReport {
-    /// Returns what a result says; `None` if nothing was found out.
-    pub(super) fn of(result: &JobResult) -> Option<Self> {
+    /// Returns the statement of a result; `None` if no such host is known.
+    pub(super) fn from_result(result: &JobResult) -> Option<Self> {
         let found: &Integrity = result.integrity.as_ref()?;
         Some(Self {
             banned_hosts: found.banned_hosts.clone(),

@@ -65,7 +65,7 @@ impl ColumnChoice {
         format: &CsvFormat,
     ) -> Result<Self, LocatedProblem> {
         let at_header = |problem| (Some(header.line), problem);
-        let read = |place| Cells::of(text, header, place)?.choice(header, format);
+        let read = |place| Cells::collect(text, header, place)?.choice(header, format);
         if let Some(column) = &format.column {
             let mut places = header.names.iter().enumerate().filter(|(_, name)| *name == column);
             return match (places.next(), places.next()) {
@@ -101,7 +101,7 @@ impl ColumnChoice {
 /// Returns the places of columns of which the cells themselves say that they are velocities.
 fn places_with_units(text: &str, header: &Header) -> Vec<usize> {
     let mut places = BTreeSet::new();
-    for line in TableLines::of(text, header, None).take(EXAMINED_ROWS) {
+    for line in TableLines::after_header(text, header, None).take(EXAMINED_ROWS) {
         let Ok((_, TableLine::Data(fields))) = line else { continue };
         for (place, field) in fields.iter().enumerate() {
             let read = DecimalMark::ALL.into_iter().find_map(|mark| CellNumber::read(field, mark));
@@ -152,9 +152,9 @@ struct Cells {
 }
 
 impl Cells {
-    fn of(text: &str, header: &Header, place: usize) -> Result<Self, LocatedProblem> {
+    fn collect(text: &str, header: &Header, place: usize) -> Result<Self, LocatedProblem> {
         let mut cells = Self { place, ..Self::default() };
-        for line in TableLines::of(text, header, Some(place)) {
+        for line in TableLines::after_header(text, header, Some(place)) {
             match line? {
                 (_, TableLine::Units(units)) => {
                     cells.unit_below = units.get(place).copied().flatten()
@@ -201,7 +201,7 @@ impl Cells {
 
     fn choice(&self, header: &Header, format: &CsvFormat) -> Result<ColumnChoice, LocatedProblem> {
         let name = &header.names[self.place];
-        let says = ColumnName::of(name);
+        let says = ColumnName::parse(name);
         let column = || shortened(name);
         let at_header = |problem| (Some(header.line), problem);
         if says.has_other_velocity_unit() && format.unit.is_none() {

@@ -144,7 +144,7 @@ fn is_western(bytes: &[u8]) -> bool {
 
 /// Returns whether a text names velocities by a word beyond ASCII.
 fn is_named(text: &str) -> bool {
-    !text.is_ascii() && ColumnName::of(text).has_word()
+    !text.is_ascii() && ColumnName::parse(text).has_word()
 }
 
 /// Returns UTF-16 in the order in which every other byte of a number is 0.

@@ -82,7 +82,7 @@ const TAR_MARK_AT: usize = 257;
 
 impl FileKind {
     /// Returns the kind of a file with these bytes.
-    pub(super) fn of(bytes: &[u8]) -> Self {
+    pub(super) fn recognize(bytes: &[u8]) -> Self {
         let begins = |with: &[u8]| bytes.starts_with(with);
         if begins(b"\x1f\x8b") {
             return Self::Gzip;
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_kind_is_known_by_its_first_bytes() {
-        let what = |bytes: &[u8]| match FileKind::of(bytes) {
+        let what = |bytes: &[u8]| match FileKind::recognize(bytes) {
             FileKind::Other { what, .. } => what,
             FileKind::Text => "text",
             FileKind::Gzip => "gzip",

@@ -37,14 +37,14 @@ pub(super) struct Header {
 
 impl Header {
     /// Finds the header as the keys say, or as the text shows.
-    pub(super) fn of(content: &Content, format: &CsvFormat) -> Result<Self, LocatedProblem> {
+    pub(super) fn find(content: &Content, format: &CsvFormat) -> Result<Self, LocatedProblem> {
         let is_given = format.header_line.is_some() || !format.is_found_out;
         if is_given { given(content, format) } else { found(content, format) }
     }
 
     /// Returns the records below the header.
     pub(super) fn rows<'a>(&self, text: &'a str) -> TextRecords<'a> {
-        TextRecords::of(text, self.separator).skip_lines(self.lines_above)
+        TextRecords::split(text, self.separator).skip_lines(self.lines_above)
     }
 }
 
@@ -100,7 +100,7 @@ fn given(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
         None => format.skip_lines.unwrap_or(0),
     };
     let mut above = None;
-    let records = TextRecords::of(&content.text, named.unwrap_or_default()).skip_lines(skipped);
+    let records = TextRecords::split(&content.text, named.unwrap_or_default()).skip_lines(skipped);
     for record in records {
         let record = record?;
         let is_named = format.header_line == Some(record.line);
@@ -200,7 +200,7 @@ fn found(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
     let mut fallback = None;
     let mut first_problem = None;
     for separator in separators {
-        let beginning = Beginning::of(&content.text, separator, skipped)?;
+        let beginning = Beginning::read(&content.text, separator, skipped)?;
         match beginning.header() {
             Ok(Some((score, header))) => keep_better(&mut best, score, header),
             Err(problem) => first_problem = first_problem.or(Some(problem)),
@@ -257,9 +257,9 @@ struct Beginning<'a> {
 }
 
 impl<'a> Beginning<'a> {
-    fn of(text: &'a str, separator: Separator, skipped: usize) -> Result<Self, LocatedProblem> {
+    fn read(text: &'a str, separator: Separator, skipped: usize) -> Result<Self, LocatedProblem> {
         let mut records = Vec::new();
-        for record in TextRecords::of(text, separator).skip_lines(skipped) {
+        for record in TextRecords::split(text, separator).skip_lines(skipped) {
             let record = record?;
             if record.is_blank() || Separator::of_first_line(record.text).is_some() {
                 continue;
@@ -289,7 +289,7 @@ impl<'a> Beginning<'a> {
                 continue;
             }
             let has_word =
-                places.iter().any(|&place| ColumnName::of(&header.names[place]).has_word());
+                places.iter().any(|&place| ColumnName::parse(&header.names[place]).has_word());
             let score = self.rows_below(at, &header, &places, self.records.len());
             if let Some((before, _, other, _)) = found.last() {
                 let places = velocity_places(&other.names);
@@ -409,7 +409,7 @@ fn is_gap(cell: &str) -> bool {
 /// Returns the places of names that are of velocities, and not only a unit.
 pub(super) fn velocity_places(names: &[String]) -> Vec<usize> {
     let is_one =
-        |name: &&String| !is_velocity_unit(name) && ColumnName::of(name).is_of_velocities();
+        |name: &&String| !is_velocity_unit(name) && ColumnName::parse(name).is_of_velocities();
     let places = names.iter().enumerate().filter(|(_, name)| is_one(name));
     places.map(|(place, _)| place).collect()
 }

@@ -40,7 +40,7 @@ pub(super) struct TableLines<'a> {
 }
 
 impl<'a> TableLines<'a> {
-    pub(super) fn of(text: &'a str, header: &'a Header, place: Option<usize>) -> Self {
+    pub(super) fn after_header(text: &'a str, header: &'a Header, place: Option<usize>) -> Self {
         let records = header.rows(text);
         Self { records, header, place, is_first: true, is_after_gap: false }
     }
@@ -76,11 +76,13 @@ impl<'a> TableLines<'a> {
         let first = fields.iter().find(|field| !field.is_empty())?;
         let before = place.checked_sub(1).and_then(|place| fields.get(place));
         let of_place = fields.get(place).filter(|field| *field != first);
-        SummaryLabel::of(first)
+        SummaryLabel::recognize(first)
             .or_else(|| {
-                before.filter(|field| *field != first).and_then(|field| SummaryLabel::of(field))
+                before
+                    .filter(|field| *field != first)
+                    .and_then(|field| SummaryLabel::recognize(field))
             })
-            .or_else(|| of_place.and_then(|field| SummaryLabel::of(field)))
+            .or_else(|| of_place.and_then(|field| SummaryLabel::recognize(field)))
     }
 }
 

@@ -133,7 +133,7 @@ const QUALIFIER_MAX: usize = 4;
 /// Longest name that is looked at, bytes.
 const NAME_BYTES_MAX: usize = 400;
 
-/// What the words of a name say.
+/// Meaning of the words in the name of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Word {
     Velocity,
@@ -144,7 +144,7 @@ enum Word {
     None,
 }
 
-/// What a name says.
+/// How the name of a column is understood.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ColumnName {
     word: Word,
@@ -152,8 +152,8 @@ pub(super) struct ColumnName {
 }
 
 impl ColumnName {
-    /// Looks at a name.
-    pub(super) fn of(name: &str) -> Self {
+    /// Returns how the name of a column is understood.
+    pub(super) fn parse(name: &str) -> Self {
         if name.len() > NAME_BYTES_MAX {
             return Self { word: Word::None, unit: None };
         }
@@ -322,7 +322,7 @@ mod tests {
             ("\u{97f3}\u{901f}\u{ff08}m/s\u{ff09}", Some(m)),
             ("longitudinal velocity", None),
         ] {
-            let says = ColumnName::of(name);
+            let says = ColumnName::parse(name);
             assert!(says.is_of_velocities(), "{name}: {says:?}");
             assert_eq!(says.velocity_unit(), unit, "{name}");
         }
@@ -362,9 +362,13 @@ mod tests {
             "SV-C.Xchange (No Sensor)",
             "UPV ratio",
         ] {
-            assert!(!ColumnName::of(name).is_of_velocities(), "{name}: {:?}", ColumnName::of(name));
+            assert!(
+                !ColumnName::parse(name).is_of_velocities(),
+                "{name}: {:?}",
+                ColumnName::parse(name)
+            );
         }
-        assert!(ColumnName::of("velocity (ft/s)").has_other_velocity_unit());
-        assert!(ColumnName::of("velocity (ft/s)").is_of_velocities());
+        assert!(ColumnName::parse("velocity (ft/s)").has_other_velocity_unit());
+        assert!(ColumnName::parse("velocity (ft/s)").is_of_velocities());
     }
 }

@@ -18,7 +18,7 @@ pub(super) fn of_file(path: &Path, format: &CsvFormat) -> Result<Vec<Content>, L
     let read = user_file::read(path, limits::FILE_BYTES_MAX);
     let bytes = read.map_err(|error| (None, Problem::Unreadable(error)))?;
     let bytes = bytes.ok_or((None, Problem::TooLarge))?;
-    let bytes = match FileKind::of(&bytes) {
+    let bytes = match FileKind::recognize(&bytes) {
         FileKind::Gzip => unpacked(&bytes).map_err(|problem| (None, problem))?,
         _ => bytes,
     };
@@ -27,7 +27,7 @@ pub(super) fn of_file(path: &Path, format: &CsvFormat) -> Result<Vec<Content>, L
 
 fn of_bytes(bytes: Vec<u8>, format: &CsvFormat) -> Result<Vec<Content>, LocatedProblem> {
     let no_line = |problem| (None, problem);
-    match FileKind::of(&bytes) {
+    match FileKind::recognize(&bytes) {
         FileKind::Text => {
             let decoded = encodings::decoded(bytes, format.encoding, format.is_found_out)?;
             let encodings::Decoded { text, encoding, had_invisible } = decoded;

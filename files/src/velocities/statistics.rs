@@ -167,7 +167,7 @@ pub(super) struct SummaryLabel {
 
 impl SummaryLabel {
     /// Returns the label that a cell is.
-    pub(super) fn of(cell: &str) -> Option<Self> {
+    pub(super) fn recognize(cell: &str) -> Option<Self> {
         let begins = cell.chars().next()?;
         if cell.len() > BYTES_MAX
             || !(begins.is_alphabetic() || matches!(begins, '"' | '\'' | '#' | '*' | '('))
@@ -211,7 +211,7 @@ pub(super) struct Statistics {
 
 impl Statistics {
     /// Returns those of velocities; `None` if there are fewer than two.
-    pub(super) fn of(velocities: &[f64]) -> Option<Self> {
+    pub(super) fn from_velocities(velocities: &[f64]) -> Option<Self> {
         if velocities.len() < 2 {
             return None;
         }
@@ -272,7 +272,11 @@ mod tests {
     #[test]
     fn labels_are_told_from_names() {
         let check = |text: &str, expected: Option<Statistic>| {
-            assert_eq!(SummaryLabel::of(text).map(|label| label.statistic), expected, "{text}");
+            assert_eq!(
+                SummaryLabel::recognize(text).map(|label| label.statistic),
+                expected,
+                "{text}"
+            );
         };
         for (text, expected) in [
             ("Mean", Statistic::Mean),
@@ -295,13 +299,13 @@ mod tests {
         for text in ["P1", "A", "Max M\u{fc}ller", "Meaney", "12", "", "left", "total hip left"] {
             check(text, None);
         }
-        assert!(SummaryLabel::of("SD").is_some_and(|label| label.is_like_name));
-        assert!(SummaryLabel::of("Mean").is_some_and(|label| !label.is_like_name));
+        assert!(SummaryLabel::recognize("SD").is_some_and(|label| label.is_like_name));
+        assert!(SummaryLabel::recognize("Mean").is_some_and(|label| !label.is_like_name));
     }
 
     #[test]
     fn a_statistic_is_known_by_its_value() {
-        let of_four = Statistics::of(&[3900.0, 3910.0, 3920.0, 3950.0]).unwrap();
+        let of_four = Statistics::from_velocities(&[3900.0, 3910.0, 3920.0, 3950.0]).unwrap();
         for (statistic, value, rounding, expected) in [
             (Statistic::Mean, 3920.0, 0.5, true),
             (Statistic::Mean, 3921.0, 0.5, false),
@@ -317,6 +321,6 @@ mod tests {
         ] {
             assert_eq!(of_four.is(statistic, value, rounding), expected, "{statistic:?} {value}");
         }
-        assert_eq!(Statistics::of(&[3900.0]), None);
+        assert_eq!(Statistics::from_velocities(&[3900.0]), None);
     }
 }

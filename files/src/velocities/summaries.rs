@@ -51,10 +51,10 @@ pub(super) fn of_table(
     header: &Header,
     choice: &ColumnChoice,
 ) -> Result<Summaries, LocatedProblem> {
-    let mut rows = SummedRows::of(text, header, choice, true)?;
+    let mut rows = SummedRows::collect(text, header, choice, true)?;
     if rows.suspects.iter().filter(|one| one.label.is_none()).count() > BARE_MAX {
         // Where many rows have only a velocity, that says nothing.
-        rows = SummedRows::of(text, header, choice, false)?;
+        rows = SummedRows::collect(text, header, choice, false)?;
     }
     rows.verdicts(choice)
 }
@@ -74,14 +74,14 @@ struct SummedRows {
 }
 
 impl SummedRows {
-    fn of(
+    fn collect(
         text: &str,
         header: &Header,
         choice: &ColumnChoice,
         are_bare_noticed: bool,
     ) -> Result<Self, LocatedProblem> {
         let mut rows = Self { rounding: f64::INFINITY, ..Self::default() };
-        let mut lines = TableLines::of(text, header, Some(choice.place));
+        let mut lines = TableLines::after_header(text, header, Some(choice.place));
         // A label may stand on a line of its own, above its value.
         let mut waiting: Option<SummaryLabel> = None;
         let mut other_shapes = 0;
@@ -130,7 +130,7 @@ impl SummedRows {
                 if are_labelled {
                     return Err((Some(line), Problem::ManySummaries));
                 }
-                return Self::of(text, header, choice, false);
+                return Self::collect(text, header, choice, false);
             }
         }
         Ok(rows)
@@ -146,18 +146,18 @@ impl SummedRows {
     fn verdicts(&self, choice: &ColumnChoice) -> Result<Summaries, LocatedProblem> {
         let mut left_out = Summaries::new();
         let rows = self.velocities.len();
-        let all = Statistics::of(&self.velocities);
+        let all = Statistics::from_velocities(&self.velocities);
         let mut work = 0;
         let mut last = 0;
         for block in self.suspects.chunk_by(|one, next| one.above == next.above) {
             let above = block[0].above;
             let before = &self.velocities[last..above];
             work += before.len();
-            let before = Statistics::of(before).filter(|_| work < WORK_MAX);
+            let before = Statistics::from_velocities(before).filter(|_| work < WORK_MAX);
             let behind =
                 self.velocities.get(above..above + self.length_behind(above)).unwrap_or_default();
             work += behind.len();
-            let behind = Statistics::of(behind).filter(|_| work < WORK_MAX);
+            let behind = Statistics::from_velocities(behind).filter(|_| work < WORK_MAX);
             let sets = [all, before, behind];
             let matches: Vec<bool> =
                 block.iter().map(|one| self.is_found(one, choice, &sets)).collect();

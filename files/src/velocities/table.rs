@@ -38,12 +38,12 @@ impl VelocityTable {
         let (Some(first), second) = (contents.next(), contents.next()) else {
             return Err((None, Problem::Empty));
         };
-        let Some(second) = second else { return Self::of(first, format) };
+        let Some(second) = second else { return Self::from_content(first, format) };
         // Of several tables, the one that has velocities.
         let mut understood = None;
         let mut first_problem = None;
         for content in [first, second].into_iter().chain(contents) {
-            match (Self::of(content, format), &understood) {
+            match (Self::from_content(content, format), &understood) {
                 (Ok(table), None) => understood = Some(table),
                 (Ok(table), Some(other)) => {
                     return Err((
@@ -57,7 +57,7 @@ impl VelocityTable {
         understood.ok_or_else(|| first_problem.unwrap_or((None, Problem::Empty)))
     }
 
-    fn of(content: Content, format: &CsvFormat) -> Result<Self, LocatedProblem> {
+    fn from_content(content: Content, format: &CsvFormat) -> Result<Self, LocatedProblem> {
         // What was no text has tabs and decimal points, whatever the keys say.
         let of_table = CsvFormat {
             separator: content.separator(),
@@ -65,7 +65,7 @@ impl VelocityTable {
             ..format.clone()
         };
         let format = if content.separator().is_some() { &of_table } else { format };
-        let header = Header::of(&content, format)?;
+        let header = Header::find(&content, format)?;
         let choice = match format.is_found_out {
             true => ColumnChoice::found(&content.text, &header, format)?,
             false => {
@@ -204,7 +204,8 @@ impl VelocityTable {
 
     /// Returns the cells of each row that is a measurement or has a missing value.
     pub(crate) fn rows(&self) -> impl Iterator<Item = Vec<String>> {
-        let lines = TableLines::of(&self.content.text, &self.header, Some(self.choice.place));
+        let lines =
+            TableLines::after_header(&self.content.text, &self.header, Some(self.choice.place));
         lines.filter_map(|line| match line.ok()? {
             (line, TableLine::Data(fields) | TableLine::Labelled { fields, .. }) => {
                 let is_row = fields.len() == self.header.names.len();
@@ -239,7 +240,7 @@ pub(super) fn place_of(names: &[String], column: &str) -> Result<usize, Problem>
 /// Refuses a unit below the header that is not that of the job.
 fn check_units(text: &str, header: &Header, choice: &ColumnChoice) -> Result<(), LocatedProblem> {
     let Some(Ok((line, TableLine::Units(units)))) =
-        TableLines::of(text, header, Some(choice.place)).next()
+        TableLines::after_header(text, header, Some(choice.place)).next()
     else {
         return Ok(());
     };

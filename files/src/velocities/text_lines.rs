@@ -44,7 +44,7 @@ pub(super) struct TextRecords<'a> {
 
 impl<'a> TextRecords<'a> {
     /// Returns the records of a text whose fields are separated so.
-    pub(super) fn of(text: &'a str, separator: Separator) -> Self {
+    pub(super) fn split(text: &'a str, separator: Separator) -> Self {
         Self { rest: text, line: 1, separator, searches: SEARCHES_MAX }
     }
 
@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     fn records(text: &str) -> Vec<(usize, &str)> {
-        TextRecords::of(text, Separator::Comma)
+        TextRecords::split(text, Separator::Comma)
             .map(|record| record.map_or((0, ""), |record| (record.line, record.text)))
             .collect()
     }
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn lines_are_skipped_whatever_is_in_them() {
-        let rest = TextRecords::of("\"open\nx\nvelocity\n", Separator::Comma).skip_lines(2);
+        let rest = TextRecords::split("\"open\nx\nvelocity\n", Separator::Comma).skip_lines(2);
         let found: Vec<_> = rest.map(|record| record.map(|record| record.line)).collect();
         assert!(matches!(found[..], [Ok(3)]));
     }

@@ -134,7 +134,7 @@ fn of_finding(finding: &Finding<'_>) -> Vec<Verdict> {
     found
 }
 
-/// What was found out later about the hosts that computed the result.
+/// Says whether a host that computed a part of the result was banned after the job had ended.
 fn hosts(run: &ReportedRun) -> Option<Verdict> {
     let found = match &run.content {
         RunContent::Identification(result, _) => result.integrity.as_ref()?,
