@@ -163,6 +163,11 @@ impl Ballot {
         })
     }
 
+    /// Returns whether no two hosts have voted differently.
+    pub(crate) fn is_unanimous(&self) -> bool {
+        self.answers.iter().filter(|(_, count)| *count > 0).count() < 2
+    }
+
     /// Returns two votes that differ, at the first index where they do.
     pub(crate) fn contradiction(&self) -> Option<Contradiction> {
         let mut votes = self.votes.values();

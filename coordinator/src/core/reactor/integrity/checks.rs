@@ -150,9 +150,14 @@ pub(crate) fn decide_proofs(turn: &mut Turn, setup: &SetupKey) {
 
 /// Bans the hosts whose proofs of a setup differ from that of the majority.
 fn ban_outvoted_by_proofs(turn: &mut Turn, setup: &SetupKey) {
-    let voters = votes::proof_voters(turn.state, setup, turn.now);
-    let proofs = turn.state.proofs.for_setup(setup);
-    let verdict = proofs.and_then(|proofs| proofs.ballot.verdict(voters));
+    let Some(proofs) = turn.state.proofs.for_setup(setup) else {
+        return;
+    };
+    if proofs.ballot.is_unanimous() {
+        // The voters of a thousand hosts need not be counted after each proof.
+        return;
+    }
+    let verdict = proofs.ballot.verdict(votes::proof_voters(turn.state, setup, turn.now));
     if let Some((verdict, job)) = verdict.zip(turn.state.active_job_of(setup)) {
         ban_outvoted(turn, job, verdict);
     }
