@@ -3,8 +3,8 @@
 //!
 //! Machines fail for more reasons than poison tasks: a bad node crashes whatever it is given, and a
 //! stopped coordinator loses all workers at once. So a realization is only blamed for workers that
-//! had answered something before, whose streams broke and that did not come back, on different
-//! hosts if there are any.
+//! had answered something before, whose streams broke while they held nothing else and that did not
+//! come back, on different hosts if there are any.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -38,8 +38,10 @@ pub(crate) struct LostWorker {
     pub(crate) cause: Cause,
     /// Time when its stay ended.
     pub(crate) at: Duration,
-    /// It held exactly one batch.
+    /// It held exactly one batch, maybe beside its proof.
     pub(crate) alone: bool,
+    /// It was computing its proof, which may be to blame as well.
+    pub(crate) owed_proof: bool,
     /// It had answered something in this stay.
     pub(crate) has_answered: bool,
 }
@@ -47,7 +49,7 @@ pub(crate) struct LostWorker {
 impl LostWorker {
     /// Returns whether the loss counts as evidence against the batch that the worker held.
     fn is_credible(&self) -> bool {
-        self.has_answered && self.cause == Cause::StreamBroke
+        self.has_answered && !self.owed_proof && self.cause == Cause::StreamBroke
     }
 }
 
@@ -138,6 +140,7 @@ mod tests {
                 cause: Cause::StreamBroke,
                 at: Duration::ZERO,
                 alone: true,
+                owed_proof: false,
                 has_answered: true,
             };
             change(process, &mut loss);
@@ -167,8 +170,9 @@ mod tests {
             check(&hosts, change, [false, false]);
             check(&eleven, change, [false, false]);
         }
-        let little: [fn(usize, &mut LostWorker); 3] = [
+        let little: [fn(usize, &mut LostWorker); 4] = [
             |_, loss| loss.has_answered = false,
+            |_, loss| loss.owed_proof = true,
             |_, loss| loss.cause = Cause::Silence,
             |_, loss| loss.cause = Cause::Misbehaviour,
         ];
@@ -188,6 +192,7 @@ mod tests {
             cause,
             at: Duration::ZERO,
             alone: true,
+            owed_proof: false,
             has_answered: true,
         };
         for (cause, left) in

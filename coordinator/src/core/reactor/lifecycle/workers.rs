@@ -153,6 +153,7 @@ fn lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
         cause,
         at: turn.now,
         alone,
+        owed_proof: !gone.proofs.is_empty(),
         has_answered: gone.has_answered,
     };
     for batch in gone.in_flight {
