@@ -41,19 +41,18 @@ pub(crate) fn is_chosen(
     uniform(key, [job.0, number, first]) < fraction
 }
 
-/// Returns which of the realizations `answered` by a worker with `slots` slots are audited, and how many
-/// realizations it computes until the next ones are; `None` if the audits are not due. So that a machine
-/// that breaks is found soon, few realizations are audited often, one for each slot: on another worker they
-/// take no longer than one. When they are due is drawn, so that no worker can foresee it: twice the mean at
-/// the latest. `left` is what was drawn before.
+/// Returns which of the realizations `answered` by a worker are audited, and how many realizations it computes
+/// until the next ones are; `None` if the audits are not due. So that a machine that breaks is found soon, few
+/// realizations are audited often, `least` at a time. When they are due is drawn, so that no worker can foresee
+/// it: twice the mean at the latest. `left` is what was drawn before.
 pub(crate) fn choose(
     (key, fraction): (&AuditKey, f64),
-    (batch, slots): (BatchId, u32),
+    (batch, least): (BatchId, u64),
     answered: Indices,
     left: f64,
 ) -> (Option<Indices>, f64) {
     let share = (fraction * answered.count as f64).ceil() as u64;
-    let length = share.max(slots.into()).clamp(1, answered.count);
+    let length = share.max(least).clamp(1, answered.count);
     let drawn = |what| uniform(key, [batch.0, answered.first, what]);
     let left = left - answered.count as f64;
     if left > 0.0 {
@@ -128,7 +127,8 @@ mod tests {
         for batch in 0..batches {
             let answered = Indices { first: batch * count, count };
             let key = &AuditKey([7; 32]);
-            let (chosen, next) = choose((key, fraction), (BatchId(batch), slots), answered, left);
+            let (chosen, next) =
+                choose((key, fraction), (BatchId(batch), slots.into()), answered, left);
             left = next;
             since += count;
             if let Some(chosen) = chosen {

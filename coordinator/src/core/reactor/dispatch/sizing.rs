@@ -29,6 +29,9 @@ const SHARE_DIVISOR: f64 = 4.0;
 const BATCH_COST_S: f64 = 1e-4;
 /// Time that a batch takes its worker, s, from which on its cost does not matter.
 const WORTH_S: f64 = 0.02;
+/// Time that an audit takes at least on a worker like the one audited, s. With 1 % of audits each worker is
+/// audited once a second in the mean.
+const AUDIT_S: f64 = 0.01;
 /// Number of workers that must have computed something of a job before it is known how fast one of the
 /// others may be.
 const KNOWN_MIN: u64 = 8;
@@ -101,6 +104,14 @@ pub(crate) fn is_one_batch_each(
     };
     let suffices = |rate| realizations(state, job) <= size as f64 / rate * fleet.total;
     state.jobs.get(&job).is_some_and(is_alone) && rate(attached, job, fleet).is_some_and(suffices)
+}
+
+/// Returns the number of realizations of an answer that are audited together at least: one for each slot, which
+/// take another worker no longer than one, and more if they take so little time that the batch costs more.
+pub(crate) fn audit_least(attached: &AttachedWorker, job: JobId) -> u64 {
+    let rate = attached.rates.get(&job).copied().unwrap_or_default();
+    // `as` saturates, and converts NaN to 0.
+    ((rate * AUDIT_S) as u64).max(attached.hello.slots.into())
 }
 
 /// Returns the number of realizations of an audit of so many that a worker gets at once, when nothing else
