@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use super::{overdue, proofs, votes};
+use super::{overdue, proofs};
 use crate::core::audit;
 use crate::core::evaluation::{Audit, PendingEvaluation};
 use crate::core::ids::{BatchId, JobId, WorkerId};
@@ -12,6 +12,20 @@ use crate::core::proofs::SetupKey;
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
 use crate::core::worker_name::WorkerName;
+
+/// Returns the number of hosts whose votes on a setup count: those that have voted, and those whose
+/// answers are on their way.
+pub(crate) fn proof_voters(state: &State, setup: &SetupKey, now: Duration) -> usize {
+    let Some(proofs) = state.proofs.for_setup(setup) else {
+        return 0;
+    };
+    if proofs.out.is_empty() {
+        return proofs.ballot.count();
+    }
+    let awaited = proofs.out.iter().filter(|(_, batch)| !overdue::is_overdue(state, **batch, now));
+    let awaited = awaited.filter_map(|(id, _)| Some(state.workers.get(id)?.name.host()));
+    awaited.chain(proofs.ballot.hosts()).collect::<BTreeSet<_>>().len()
+}
 
 /// Returns the attempts at evaluations of a job whose results come from workers without a proof that the
 /// majority confirms. They are not saved: after a restart nobody would know that they do not count yet.
@@ -22,7 +36,7 @@ pub(crate) fn unproven_attempts(state: &State, job: JobId, now: Duration) -> BTr
     let Some(proofs) = state.proofs.for_setup(&job.setup) else {
         return BTreeSet::new();
     };
-    let voters = votes::proof_voters(state, &job.setup, now);
+    let voters = proof_voters(state, &job.setup, now);
     let confirms =
         |name: &WorkerName| proofs.is_given_by(name) && proofs.ballot.confirms(name.host(), voters);
     let unproven = job.certain().filter(|evaluation| !evaluation.workers.iter().all(confirms));
@@ -51,7 +65,7 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
     }
     let setup = job.setup;
     let state = &*turn.state;
-    let voters = votes::proof_voters(state, &setup, turn.now);
+    let voters = proof_voters(state, &setup, turn.now);
     let names = evaluation.workers.iter().enumerate();
     let needs: Vec<(usize, Need)> = names
         .map(|(place, name)| {
@@ -177,7 +191,7 @@ fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) {
     let Some(proofs) = turn.state.proofs.for_setup(setup) else {
         return;
     };
-    let voters = votes::proof_voters(turn.state, setup, turn.now);
+    let voters = proof_voters(turn.state, setup, turn.now);
     let voted = proofs.ballot.count();
     let lacks = proofs.ballot.lacks(voters);
     let now = turn.now;

@@ -153,18 +153,18 @@ pub(crate) fn dispatch(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
         {
             continue;
         }
-        let Some(choose_worker) = (if alone {
-            taker_alone(turn.state, id, turn.now)
-        } else {
-            choose_worker(turn.state, id, &free, turn.now)
-        }) else {
+        let chosen = match alone {
+            true => choose_exclusive_worker(turn.state, id, turn.now),
+            false => choose_worker(turn.state, id, &free, turn.now),
+        };
+        let Some(chosen) = chosen else {
             continue;
         };
-        if alone && holds_anything(turn.state, choose_worker) {
-            kept.insert(choose_worker);
+        if alone && holds_anything(turn.state, chosen) {
+            kept.insert(chosen);
         } else {
-            send(turn, id, choose_worker);
-            free.retain(|free| *free != choose_worker);
+            send(turn, id, chosen);
+            free.retain(|free| *free != chosen);
             sent += 1;
         }
     }
@@ -185,26 +185,31 @@ fn holds_anything(state: &State, worker: WorkerId) -> bool {
 }
 
 /// Chooses which of the workers in `free` gets a duplicate of a batch.
-fn choose_worker(state: &State, id: BatchId, free: &[WorkerId], now: Duration) -> Option<WorkerId> {
-    let rank = |(worker, choose_worker): &(&AttachedWorker, WorkerId)| {
+fn choose_worker(
+    state: &State,
+    batch: BatchId,
+    free: &[WorkerId],
+    now: Duration,
+) -> Option<WorkerId> {
+    let rank = |(worker, id): &(&AttachedWorker, WorkerId)| {
         let doubtful = state.may_be_silent(worker);
         let on_probation = !state.is_sound(worker);
-        let of_holder = is_of_holder(state, id, worker);
-        (on_probation, doubtful, of_holder, state.held(worker), *choose_worker)
+        let of_holder = is_of_holder(state, batch, worker);
+        (on_probation, doubtful, of_holder, state.held(worker), *id)
     };
     // Who has never answered anything gets no copy while another worker is there that has, busy or not.
     let answers = |worker: &AttachedWorker| {
-        worker.has_answered && state.is_sound(worker) && may_have(state, id, &worker.name)
+        worker.has_answered && state.is_sound(worker) && may_have(state, batch, &worker.name)
     };
     let any_answers = state.workers.values().any(answers);
     let free = free.iter().filter_map(|id| Some((state.workers.get(id)?, *id)));
     let known = free.filter(|(worker, _)| worker.has_answered || !any_answers);
-    let fit = known.filter(|(worker, _)| is_fit(state, id, worker, now));
-    fit.min_by_key(rank).map(|(_, choose_worker)| choose_worker)
+    let fit = known.filter(|(worker, _)| is_fit(state, batch, worker, now));
+    fit.min_by_key(rank).map(|(_, id)| id)
 }
 
 /// Chooses the worker that gets a duplicate of an exclusive batch, whether it is busy or not.
-fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
+fn choose_exclusive_worker(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
     let batch = state.batches.get(&id)?;
     let crashes =
         state.evaluation_of(&batch.assignment)?.crashes.get(&batch.assignment.indices.first);
@@ -214,21 +219,16 @@ fn taker_alone(state: &State, id: BatchId, now: Duration) -> Option<WorkerId> {
         return None;
     }
     let rank =
-        |(choose_worker, worker): &(&WorkerId, &AttachedWorker)| -> (Reputation, bool, usize, WorkerId) {
+        |(other, worker): &(&WorkerId, &AttachedWorker)| -> (Reputation, bool, usize, WorkerId) {
             let reputation = poison::reputation(state, worker, crashes);
-            (
-                reputation,
-                is_of_holder(state, id, worker),
-                state.held(worker),
-                **choose_worker,
-            )
+            (reputation, is_of_holder(state, id, worker), state.held(worker), **other)
         };
     let risks_failing = risks_failing(state, batch, crashes, now);
     let fit = |worker: &AttachedWorker| {
         is_fit(state, id, worker, now) && (risks_failing || !state.is_failing(worker.name.host()))
     };
     let fit = state.workers.iter().filter(|(_, worker)| fit(worker));
-    fit.min_by_key(rank).map(|(choose_worker, _)| *choose_worker)
+    fit.min_by_key(rank).map(|(chosen, _)| *chosen)
 }
 
 /// Returns whether an exclusive batch may go to a host whose workers are lost whatever they hold: the

@@ -1,44 +1,22 @@
-//! Counts the hosts whose votes on a proof or on a dispute count.
+//! Counts the hosts that may decide a dispute.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
 
 use crate::core::ballot::VOTERS_MAX;
 use crate::core::dispute::Dispute;
 use crate::core::ids::{BatchId, WorkerId};
-use crate::core::proofs::SetupKey;
 use crate::core::state::{AttachedWorker, State};
-
-use super::overdue;
-
-/// Returns the number of hosts whose votes on a setup count: those that have voted, and those whose
-/// answers are on their way.
-pub(crate) fn proof_voters(state: &State, setup: &SetupKey, now: Duration) -> usize {
-    let Some(proofs) = state.proofs.for_setup(setup) else {
-        return 0;
-    };
-    if proofs.out.is_empty() {
-        return proofs.ballot.count();
-    }
-    let awaited = proofs.out.iter().filter(|(_, batch)| !overdue::is_overdue(state, **batch, now));
-    let awaited = awaited.filter_map(|(id, _)| Some(state.workers.get(id)?.name.host()));
-    awaited.chain(proofs.ballot.hosts()).collect::<BTreeSet<_>>().len()
-}
 
 /// Returns whether a dispute needs more votes than are on their way.
 pub(crate) fn are_lacking(state: &State, dispute: &Dispute) -> bool {
     // At least one more: without it there would be no dispute.
-    let lacks = dispute.ballot.lacks(dispute_voters(state, dispute, |_| false)).max(1);
+    let lacks = dispute.ballot.lacks(voters(state, dispute, |_| false)).max(1);
     dispute.tie_breakers.len() < lacks
 }
 
 /// Returns the number of hosts that may decide a dispute: those that have voted, and those with workers that
 /// answer batches, at most as many as are asked. Hosts do not count that were asked by a batch that `is_late`.
-pub(crate) fn dispute_voters(
-    state: &State,
-    dispute: &Dispute,
-    is_late: impl Fn(BatchId) -> bool,
-) -> usize {
+pub(crate) fn voters(state: &State, dispute: &Dispute, is_late: impl Fn(BatchId) -> bool) -> usize {
     let late = dispute.tie_breakers.iter().filter(|id| is_late(**id));
     let late = late.filter_map(|id| state.batches.get(id)).map(|batch| batch.worker);
     let late: Vec<WorkerId> = late.collect();

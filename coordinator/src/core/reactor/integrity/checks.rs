@@ -15,7 +15,9 @@ use crate::core::failure::{RunFailure, shown};
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::Job;
 use crate::core::proofs::SetupKey;
-use crate::core::reactor::dispatch::{batches, clearance, new_proof, overdue, poison, votes};
+use crate::core::reactor::dispatch::{
+    batches, clearance, new_proof, overdue, poison, sizing, votes,
+};
 use crate::core::reactor::lifecycle::jobs;
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
@@ -37,9 +39,9 @@ pub(crate) fn audit(state: &mut State, worker: WorkerId, batch: BatchId, assignm
     let Some(attached) = state.workers.get_mut(&worker) else {
         return;
     };
-    let slots = attached.hello.slots;
+    let least = sizing::audit_least(attached, assignment.job);
     let (chosen, left) =
-        audit::choose((&key, fraction), (batch, slots), assignment.indices, attached.until_audit);
+        audit::choose((&key, fraction), (batch, least), assignment.indices, attached.until_audit);
     attached.until_audit = left;
     let by = attached.name.clone();
     if let Some(indices) = chosen
@@ -157,7 +159,7 @@ fn ban_outvoted_by_proofs(turn: &mut Turn, setup: &SetupKey) {
         // The voters of a thousand hosts need not be counted after each proof.
         return;
     }
-    let verdict = proofs.ballot.verdict(votes::proof_voters(turn.state, setup, turn.now));
+    let verdict = proofs.ballot.verdict(clearance::proof_voters(turn.state, setup, turn.now));
     if let Some((verdict, job)) = verdict.zip(turn.state.active_job_of(setup)) {
         ban_outvoted(turn, job, verdict);
     }
@@ -192,7 +194,7 @@ fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
         return;
     };
     let is_late = |batch| overdue::is_overdue(turn.state, batch, turn.now);
-    let voters = votes::dispute_voters(turn.state, dispute, is_late);
+    let voters = votes::voters(turn.state, dispute, is_late);
     let Some(verdict) = dispute.ballot.verdict(voters) else {
         return;
     };
