@@ -41,38 +41,51 @@ pub(crate) fn is_chosen(
     uniform(key, [job.0, number, first]) < fraction
 }
 
-/// Returns which of the realizations `answered` by a worker are audited, and how many realizations it computes
-/// until the next ones are; `None` if the audits are not due. So that a machine that breaks is found soon, few
-/// realizations are audited often, `least` at a time. When they are due is drawn, so that no worker can foresee
-/// it: twice the mean at the latest. `left` is what was drawn before.
+/// When answers of a worker are audited next, and how many realizations of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NextAudit {
+    /// Number of realizations that it computes until then.
+    pub(crate) left: f64,
+    /// Number of realizations that are audited then, unless the answer has fewer.
+    pub(crate) length: u64,
+}
+
+impl NextAudit {
+    /// Returns the first audit of a worker with `slots` slots.
+    pub(crate) fn first((key, fraction): (&AuditKey, f64), lease: LeaseId, slots: u32) -> Self {
+        let u = uniform(key, [lease.0, 0, 2]);
+        Self { left: distance(fraction, slots.into(), u), length: slots.into() }
+    }
+}
+
+/// Returns which of the realizations `answered` by a worker are audited, `None` if none are due, and the audit
+/// after this one. So that a machine that breaks is found soon, few realizations are audited often, `least` at a
+/// time. When they are due is drawn, so that no worker can foresee it: twice the mean at the latest.
 pub(crate) fn choose(
     (key, fraction): (&AuditKey, f64),
     (batch, least): (BatchId, u64),
     answered: Indices,
-    left: f64,
-) -> (Option<Indices>, f64) {
-    let share = (fraction * answered.count as f64).ceil() as u64;
-    let length = share.max(least).clamp(1, answered.count);
+    due: NextAudit,
+) -> (Option<Indices>, NextAudit) {
     let drawn = |what| uniform(key, [batch.0, answered.first, what]);
-    let left = left - answered.count as f64;
+    let left = due.left - answered.count as f64;
     if left > 0.0 {
-        return (None, left);
+        return (None, NextAudit { left, ..due });
     }
+    let share = (fraction * answered.count as f64).ceil() as u64;
+    let length = share.max(due.length).clamp(1, answered.count);
     let room = answered.count - length + 1;
     let offset = ((drawn(0) * room as f64) as u64).min(room - 1);
     let audited = Indices { first: answered.first + offset, count: length };
-    // What this batch had too much counts for the next ones, so that the fraction is kept.
-    let next = if fraction >= 1.0 { 0.0 } else { left + distance(fraction, length, drawn(1)) };
-    (Some(audited), next)
-}
-
-/// Returns how many realizations a worker with `slots` slots computes until the first ones are audited.
-pub(crate) fn draw_first_distance(
-    (key, fraction): (&AuditKey, f64),
-    lease: LeaseId,
-    slots: u32,
-) -> f64 {
-    distance(fraction, slots.into(), uniform(key, [lease.0, 0, 2]))
+    if fraction >= 1.0 {
+        return (Some(audited), NextAudit { left: 0.0, length });
+    }
+    // What this answer had too much, and what was audited more than was planned, counts for the next, so that
+    // the fraction is kept.
+    let unplanned = (length as f64 - due.length as f64) / fraction;
+    let next = share.max(least).min(answered.count);
+    let left = left + unplanned + distance(fraction, next, drawn(1));
+    (Some(audited), NextAudit { left, length: next })
 }
 
 /// Returns the number of realizations for which this many audited ones are the fraction, times 2 u.
@@ -121,15 +134,15 @@ mod tests {
     /// Returns the fraction of the realizations that is audited, and the most that a worker computes between
     /// two audits, over many batches of this size.
     fn audited(fraction: f64, slots: u32, count: u64) -> (f64, u64) {
-        let first = draw_first_distance((&AuditKey([7; 32]), fraction), LeaseId(1), slots);
-        let (mut left, mut audited, mut since, mut longest) = (first, 0, 0, 0);
+        let mut due = NextAudit::first((&AuditKey([7; 32]), fraction), LeaseId(1), slots);
+        let (mut audited, mut since, mut longest) = (0, 0, 0);
         let batches = 400_000 / count;
         for batch in 0..batches {
             let answered = Indices { first: batch * count, count };
             let key = &AuditKey([7; 32]);
             let (chosen, next) =
-                choose((key, fraction), (BatchId(batch), slots.into()), answered, left);
-            left = next;
+                choose((key, fraction), (BatchId(batch), slots.into()), answered, due);
+            due = next;
             since += count;
             if let Some(chosen) = chosen {
                 assert!(chosen.first >= answered.first && chosen.end() <= answered.end());

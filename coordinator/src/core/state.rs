@@ -16,6 +16,7 @@ use osteon_proto::evaluation::EvaluationInput;
 use crate::config::Config;
 use crate::core::answer_delay::AnswerDelay;
 use crate::core::attachments::Attachments;
+use crate::core::audit::NextAudit;
 use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::event::Hello;
@@ -168,8 +169,8 @@ pub(crate) struct AttachedWorker {
     pub(crate) proven: BTreeSet<SetupKey>,
     /// Answers to batches that it holds, which came before its proof.
     pub(crate) early: Vec<EarlyAnswer>,
-    /// Number of realizations that it computes until the next ones are audited.
-    pub(crate) until_audit: f64,
+    /// When its answers are audited next.
+    pub(crate) next_audit: NextAudit,
     /// Batches that it answered or that were revoked, newest last.
     pub(crate) settled: VecDeque<(BatchId, Assignment)>,
     /// Its rate over all jobs.
@@ -416,7 +417,7 @@ impl State {
     pub(crate) fn count_checked(&mut self, name: &WorkerName, count: u64) {
         let fraction = self.config.audit_fraction;
         let stays = self.workers.values_mut().filter(|worker| worker.name == *name);
-        stays.for_each(|worker| worker.until_audit += count as f64 / fraction);
+        stays.for_each(|worker| worker.next_audit.left += count as f64 / fraction);
     }
 
     /// Returns whether an attached worker of another host answers batches, so that it can check answers.

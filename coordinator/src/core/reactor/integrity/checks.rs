@@ -40,9 +40,9 @@ pub(crate) fn audit(state: &mut State, worker: WorkerId, batch: BatchId, assignm
         return;
     };
     let least = sizing::audit_least(attached, assignment.job);
-    let (chosen, left) =
-        audit::choose((&key, fraction), (batch, least), assignment.indices, attached.until_audit);
-    attached.until_audit = left;
+    let due = attached.next_audit;
+    let (chosen, next) = audit::choose((&key, fraction), (batch, least), assignment.indices, due);
+    attached.next_audit = next;
     let by = attached.name.clone();
     if let Some(indices) = chosen
         && let Some(evaluation) = state.evaluation_of_mut(assignment)

@@ -6,7 +6,7 @@ use std::time::Duration;
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX, WORKERS_MAX};
 use osteon_common::version;
 
-use crate::core::audit;
+use crate::core::audit::NextAudit;
 use crate::core::close_reason::CloseReason;
 use crate::core::crashes::{Cause, LostWorker};
 use crate::core::effect::{Effect, Refusal};
@@ -35,7 +35,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
     let lease = LeaseId(turn.state.next_lease);
     turn.state.next_lease += 1;
     let audits = (&turn.state.config.audit_key, turn.state.config.audit_fraction);
-    let until_audit = audit::draw_first_distance(audits, lease, hello.slots);
+    let next_audit = NextAudit::first(audits, lease, hello.slots);
     let name = name(&hello);
     poison::forget_crashes(turn.state, &name);
     if turn.state.probation.attach(&name, turn.now) {
@@ -66,7 +66,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
             proofs: Vec::new(),
             proven: BTreeSet::new(),
             early: Vec::new(),
-            until_audit,
+            next_audit,
             settled: VecDeque::new(),
             rate: Rate::default(),
             rates: BTreeMap::new(),
