@@ -8,9 +8,8 @@ mod storage;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use osteon_client::client::Remote;
 use osteon_solver::Isa;
-
-use crate::client::Remote;
 
 /// Longest wait for a directory, which may be on a server that does not answer.
 const DIRECTORY_LIMIT: Duration = Duration::from_secs(30);

@@ -2,7 +2,12 @@
 
 use std::fmt;
 
-use crate::client::ClientError;
+use osteon_client::client::ClientError;
+use osteon_client::environment::EnvironmentError;
+use osteon_client::result_status;
+use osteon_client::run_error::RunError;
+use osteon_common::job::JobSpecification;
+use osteon_files::report::ResultFile;
 
 /// Outcome of a command that ran to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,7 +20,7 @@ pub(crate) enum ExitStatus {
 
 /// Exit code of a worker whose machine computes wrongly (EX_NOPERM of sysexits.h): service managers are told not
 /// to start it again.
-pub(crate) const BAD_MACHINE: u8 = 77;
+pub(crate) use osteon_client::embedded::BAD_MACHINE;
 
 /// Reason why a command did not run to its end.
 #[derive(Debug)]
@@ -53,6 +58,16 @@ impl Interruption {
     }
 }
 
+impl ExitStatus {
+    /// Returns how a command ends that shows this result.
+    pub(crate) fn of_result(specification: &JobSpecification, result: &ResultFile) -> Self {
+        match result_status::is_complete(specification, result) {
+            true => Self::Done,
+            false => Self::RunFailed,
+        }
+    }
+}
+
 impl CommandFailure {
     /// Creates the failure of bad usage or bad input.
     pub(crate) fn bad_input(error: impl Into<anyhow::Error>) -> Self {
@@ -67,20 +82,7 @@ impl CommandFailure {
     /// Creates the failure of a path that cannot be used: bad input if another path could be,
     /// failed if the machine is the cause, as with a full disk.
     pub(crate) fn unusable_path(error: std::io::Error, context: String) -> Self {
-        use std::io::ErrorKind;
-        let of_the_path = matches!(
-            error.kind(),
-            ErrorKind::NotFound
-                | ErrorKind::PermissionDenied
-                | ErrorKind::AlreadyExists
-                | ErrorKind::NotADirectory
-                | ErrorKind::IsADirectory
-                | ErrorKind::ReadOnlyFilesystem
-                | ErrorKind::InvalidFilename
-                | ErrorKind::InvalidInput
-        );
-        let error = anyhow::Error::new(error).context(context);
-        if of_the_path { Self::BadInput(error) } else { Self::Failed(error) }
+        RunError::unusable_path(error, context).into()
     }
 
     /// Returns the exit code of the process.
@@ -129,9 +131,24 @@ impl fmt::Display for CommandFailure {
     }
 }
 
+impl From<RunError> for CommandFailure {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::BadInput(error) => Self::BadInput(error),
+            RunError::Failed(error) => Self::Failed(error),
+        }
+    }
+}
+
+impl From<EnvironmentError> for CommandFailure {
+    fn from(error: EnvironmentError) -> Self {
+        Self::bad_input(error)
+    }
+}
+
 impl From<ClientError> for CommandFailure {
     fn from(error: ClientError) -> Self {
-        if error.is_bad_input() { Self::bad_input(error) } else { Self::failed(error) }
+        RunError::from(error).into()
     }
 }
 
@@ -158,26 +175,6 @@ mod tests {
             CommandFailure::bad_input(anyhow::Error::new(cause).context("refused: disk full"));
         assert_eq!(failure.to_string(), "refused: disk full");
         assert_eq!(failure.exit_code(), 2);
-    }
-
-    #[test]
-    fn a_path_is_bad_input_where_another_would_do() {
-        let code = |kind| {
-            let error = std::io::Error::from(kind);
-            let failure = CommandFailure::unusable_path(error, "cannot write DIR".to_owned());
-            assert!(failure.to_string().starts_with("cannot write DIR: "), "{failure}");
-            failure.exit_code()
-        };
-        for kind in [
-            std::io::ErrorKind::PermissionDenied,
-            std::io::ErrorKind::NotADirectory,
-            std::io::ErrorKind::ReadOnlyFilesystem,
-        ] {
-            assert_eq!(code(kind), 2, "{kind}");
-        }
-        for kind in [std::io::ErrorKind::StorageFull, std::io::ErrorKind::QuotaExceeded] {
-            assert_eq!(code(kind), 1, "{kind}");
-        }
     }
 
     #[test]

@@ -4,17 +4,20 @@
 use std::fs;
 use std::path::Path;
 
+use osteon_client::result_status;
+use osteon_client::results_directory::{self, ResultsDirectory};
+use osteon_client::run_error::RunError;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_files::document::Format as FileFormat;
 use osteon_files::job_file;
 use osteon_files::report::ResultFile;
 use osteon_fuzz::{bounded, damaged_text, properties, texts};
 
+use crate::exit_status::ExitStatus;
 use crate::output::{self, Detail, ShownResult};
 use crate::resolved::OutputFormat;
-use crate::results_directory::{self, ResultsDirectory};
+use crate::sample_result;
 use crate::slurm::queue;
-use crate::{result_status, sample_result};
 
 const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
 
@@ -28,9 +31,9 @@ fn check_result(json: &str) {
     let Ok(result) = bounded(json.len(), || ResultFile::from_json(json)) else { return };
     let specification = specification(result.kind());
     let specification = &specification;
-    let ended = bounded(json.len(), || result_status::exit_status(specification, &result));
+    let ended = bounded(json.len(), || ExitStatus::of_result(specification, &result));
     let cancelled = result_status::is_cancelled(&result);
-    assert!(!cancelled || ended == crate::ExitStatus::RunFailed);
+    assert!(!cancelled || ended == ExitStatus::RunFailed);
     let shown =
         ShownResult { specification, result: &result, directory: None, detail: Detail::Usual };
     for format in [OutputFormat::Text, OutputFormat::Json] {
@@ -62,7 +65,9 @@ fn check_directory(job: &str, json: &str) {
             Err(failure) => {
                 let read = ResultFile::from_json(json);
                 assert!(!same || read.is_err() || read.is_ok_and(|read| read.kind() != kind));
-                assert!(failure.exit_code() == 2 && failure.to_string().len() < 4096);
+                assert!(
+                    matches!(failure, RunError::BadInput(_)) && failure.to_string().len() < 4096
+                );
             }
         }
         let _ = bounded(job.len(), || results_directory::job_of(directory.path(), kind));

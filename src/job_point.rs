@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context as _, anyhow};
+use osteon_client::results_directory;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::parameters::Point;
 use osteon_files::input_file::InputFile;
@@ -10,7 +11,6 @@ use osteon_files::{job_file, report};
 
 use crate::arguments::PlaceArguments;
 use crate::exit_status::CommandFailure;
-use crate::results_directory;
 
 /// Returns the best point of the given results, or else the fixed and start values of the job in the
 /// file `job`.

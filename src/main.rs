@@ -8,12 +8,9 @@
 
 mod arguments;
 mod certificates;
-mod client;
 mod commands;
 mod cost;
 mod doctor;
-mod embedded;
-mod environment;
 mod exit_status;
 #[cfg(test)]
 mod fuzz;
@@ -24,16 +21,11 @@ mod logging;
 mod manual;
 mod new_files;
 mod observations;
-mod other_version;
 mod output;
 mod program;
 mod progress;
 mod report_directory;
-mod request_id;
 mod resolved;
-mod result_files;
-mod result_status;
-mod results_directory;
 #[cfg(test)]
 mod sample_result;
 mod signals;
@@ -42,6 +34,7 @@ mod slurm;
 mod telemetry;
 mod umbridge;
 mod unsearched_groups;
+mod user;
 mod warnings;
 
 use std::process::ExitCode;

@@ -4,6 +4,11 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context as _, anyhow};
+use osteon_client::result_files::{self, RESULT, remove_if_there};
+use osteon_client::results_directory::{
+    CASE, COMPARISON, HISTORY, JOB, POSTERIOR, REALIZATIONS, given, job_of, make_directory,
+    result_of, result_path,
+};
 use osteon_common::visible;
 use osteon_files::case_file;
 use osteon_files::document::Format;
@@ -12,11 +17,6 @@ use osteon_report::{JobTables, ReportedRun, TableError};
 
 use crate::exit_status::CommandFailure;
 use crate::progress::say;
-use crate::result_files::{self, RESULT, remove_if_there};
-use crate::results_directory::{
-    CASE, COMPARISON, HISTORY, JOB, POSTERIOR, REALIZATIONS, given, job_of, make_directory,
-    result_of, result_path,
-};
 use crate::simulation_directory::TRACES;
 
 /// Folder of a report within a directory of results.

@@ -9,6 +9,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::anyhow;
+use osteon_client::client::{Remote, SubmitOptions};
+use osteon_client::environment::{Environment, Unused};
+use osteon_client::request_id::RequestId;
 use osteon_common::job::JobKind;
 use osteon_proto::credentials::{CredentialFiles, Credentials};
 use osteon_proto::endpoint::Endpoint;
@@ -22,11 +25,8 @@ use crate::arguments::{
     ProgressFormat, ReportArguments, RunArguments, SchemaArguments, SimulateArguments,
     TokenArguments, VerbosityArguments, WorkerArguments,
 };
-use crate::client::{Remote, SubmitOptions};
 use crate::doctor::Patient;
-use crate::environment::{Environment, Unused};
 use crate::exit_status::CommandFailure;
-use crate::request_id::RequestId;
 use crate::slurm::job_script::JobScript;
 
 pub(crate) use slurm::{ScalingPlan, WorkerArray};

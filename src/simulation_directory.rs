@@ -8,6 +8,8 @@ use std::io::Write;
 use std::path::Path;
 
 use anyhow::anyhow;
+use osteon_client::result_files::{RESULT, ResultFiles, ResultOrigin};
+use osteon_client::results_directory::{CASE, JOB, ResultsDirectory, difference, given};
 use osteon_common::case::Case;
 use osteon_common::visible;
 use osteon_files::case_file;
@@ -15,8 +17,6 @@ use osteon_files::document::Format;
 
 use crate::exit_status::CommandFailure;
 use crate::program;
-use crate::result_files::{RESULT, ResultFiles, ResultOrigin};
-use crate::results_directory::{CASE, JOB, ResultsDirectory, difference, given};
 
 /// The file of the traces.
 pub(crate) const TRACES: &str = "traces.csv";

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::pin::pin;
 
 use anyhow::Context as _;
+use osteon_client::result_files;
 use osteon_common::visible;
 use osteon_coordinator::service::open_files;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
@@ -18,7 +19,6 @@ use crate::listener_security::ListenerSecurity;
 use crate::output;
 use crate::program;
 use crate::resolved::OutputFormat;
-use crate::result_files;
 use crate::signals;
 use crate::telemetry;
 

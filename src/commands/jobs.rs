@@ -4,6 +4,10 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
+use osteon_client::client::{self, ClientError, Fetched, Remote, SubmitOptions};
+use osteon_client::request_id::RequestId;
+use osteon_client::result_status;
+use osteon_client::results_directory::ResultsDirectory;
 use osteon_common::job::JobKind;
 use osteon_common::results::Status;
 use osteon_common::visible;
@@ -13,14 +17,12 @@ use osteon_proto::v1::JobSnapshot;
 use tonic::Code;
 
 use crate::arguments::JobFileArguments;
-use crate::client::{self, Client, ClientError, Fetched, Remote, SubmitOptions};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::progress::say;
-use crate::request_id::RequestId;
 use crate::resolved::OutputFormat;
-use crate::results_directory::ResultsDirectory;
-use crate::{result_status, unsearched_groups, warnings};
+use crate::user;
+use crate::{unsearched_groups, warnings};
 
 /// Shortest time between two lines of `watch`.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
@@ -48,7 +50,7 @@ pub(super) async fn submit(
     let noted = job_file::of_input(&input, kind).map_err(CommandFailure::bad_input)?;
     unsearched_groups::warn(input.path(), &noted);
     warnings::say_of_job(&noted.specification, &noted.warnings).await;
-    let mut client = Client::connect(coordinator).await?;
+    let mut client = user::connect(coordinator).await?;
     let id = client.submit(&noted.specification, request, options).await?;
     output::stdout(format).submitted(&id).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
@@ -59,7 +61,7 @@ pub(super) async fn list(
     coordinator: &Remote,
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
-    let mut client = Client::connect(coordinator).await?;
+    let mut client = user::connect(coordinator).await?;
     let (jobs, concerns) = client.list_with_concerns().await?;
     let banned = client.banned().await?;
     output::stdout(format).jobs(&jobs, &banned).map_err(stdout_failure)?;
@@ -76,7 +78,7 @@ pub(super) async fn prune(
     coordinator: &Remote,
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
-    let jobs = Client::connect(coordinator).await?.prune(older_than, keep_last).await?;
+    let jobs = user::connect(coordinator).await?.prune(older_than, keep_last).await?;
     output::stdout(format).pruned(&jobs).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
@@ -87,8 +89,8 @@ pub(super) async fn watch(
     coordinator: &Remote,
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
-    coordinator.announce();
-    let mut client = Client::connect(coordinator).await?;
+    user::announce(coordinator);
+    let mut client = user::connect(coordinator).await?;
     let mut output = output::stdout(format);
     let mut last_line: Option<Instant> = None;
     let show = |snapshot: &JobSnapshot| {
@@ -110,7 +112,7 @@ pub(super) async fn recheck(
     coordinator: &Remote,
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
-    Client::connect(coordinator).await?.recheck(job).await?;
+    user::connect(coordinator).await?.recheck(job).await?;
     watch(job, coordinator, format).await
 }
 
@@ -120,14 +122,14 @@ pub(super) async fn explain(
     coordinator: &Remote,
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
-    let explained = Client::connect(coordinator).await?.explain(job).await?;
+    let explained = user::connect(coordinator).await?.explain(job).await?;
     output::stdout(format).explanation(&explained).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
 /// `cancel`: prints the job's state afterwards.
 pub(super) async fn cancel(job: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
-    let snapshot = Client::connect(coordinator).await?.cancel(job).await?;
+    let snapshot = user::connect(coordinator).await?.cancel(job).await?;
     output::stdout(OutputFormat::Text).snapshot(&snapshot).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
@@ -139,7 +141,7 @@ pub(super) async fn fetch(
     out: &Path,
 ) -> Result<ExitStatus, CommandFailure> {
     let fetched =
-        Client::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
+        user::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
             ClientError::Refused { code: Code::FailedPrecondition, reason, .. } => {
                 CommandFailure::failed(anyhow!("{reason}; wait for it with `osteon watch {job}`"))
             }
@@ -158,7 +160,7 @@ pub(super) async fn fetch(
         None => true,
     };
     if wanted {
-        directory.write_results(specification.kind, &fetched)?;
+        directory.write_results(specification.kind, &fetched, &*user::listener())?;
     }
     let line = format!("{}\n", visible::path(out));
     output::stdout(OutputFormat::Text).verbatim(&line).map_err(stdout_failure)?;
@@ -179,7 +181,7 @@ fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, 
     if earlier == Some(stored.digest()) {
         return Ok(true);
     }
-    let failed = result_status::exit_status(specification, stored) == ExitStatus::RunFailed;
+    let failed = !result_status::is_complete(specification, stored);
     if failed && !result_status::is_cancelled(&new) || result_status::is_cancelled(stored) {
         return Ok(true);
     }

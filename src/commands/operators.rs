@@ -6,15 +6,17 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
+use osteon_client::client::{Client, Remote};
+use osteon_client::operators;
 use osteon_common::visible;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_proto::v1::BackupEnd;
 use tempfile::NamedTempFile;
 
-use crate::client::{Client, Remote, operators};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::resolved::OutputFormat;
+use crate::user;
 
 /// Name of a store's file in its directory, and of the files that SQLite keeps beside it.
 const STORE: &str = "osteon.sqlite";
@@ -26,7 +28,7 @@ pub(super) async fn workers(
     coordinator: &Remote,
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
-    let mut client = Client::connect(coordinator).await?;
+    let mut client = user::connect(coordinator).await?;
     let workers = client.workers().await?;
     let banned = client.banned().await?;
     output::stdout(format).workers(&workers, &banned).map_err(stdout_failure)?;
@@ -39,14 +41,14 @@ pub(super) async fn drain(
     coordinator: &Remote,
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
-    let worker = Client::connect(coordinator).await?.drain(worker).await?;
+    let worker = user::connect(coordinator).await?.drain(worker).await?;
     output::stdout(format).worker(&worker).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
 /// `workers unban`: prints the host whose ban is lifted.
 pub(super) async fn unban(host: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
-    let worker = Client::connect(coordinator).await?.unban(host).await?;
+    let worker = user::connect(coordinator).await?.unban(host).await?;
     let line = format!("{}\n", visible::line(&worker.host));
     output::stdout(OutputFormat::Text).verbatim(&line).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
@@ -84,7 +86,7 @@ pub(super) async fn backup(
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
     let target = unused_copy_path(directory)?;
-    let mut client = Client::connect(coordinator).await?;
+    let mut client = user::connect(coordinator).await?;
     let shown = visible::path(directory);
     SqliteStore::make_directory(directory).map_err(|error| {
         CommandFailure::unusable_path(error, format!("cannot create the directory {shown}"))

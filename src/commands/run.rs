@@ -1,31 +1,30 @@
 //! `identify` and `propagate`: a job from its file to its result.
 
+use std::net::SocketAddr;
 use std::pin::pin;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::anyhow;
+use osteon_client::client::{Client, Fetched};
+use osteon_client::embedded::{EmbeddedSetup, StoreLocation};
+use osteon_client::result_status;
+use osteon_client::results_directory::ResultsDirectory;
+use osteon_client::run::{self, JobRun};
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::results::Status;
 use osteon_coordinator::service::open_files;
 use osteon_files::job_file;
 use osteon_files::report::ResultFile;
-use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::v1::JobSnapshot;
 use osteon_solver::Isa;
 
 use crate::arguments::VerbosityArguments;
-use crate::client::{Client, Fetched, Remote, SubmitOptions};
-use crate::embedded::{Embedded, EmbeddedSetup, StoreLocation};
-use crate::environment::Unused;
 use crate::exit_status::{CommandFailure, ExitStatus, Interruption, stdout_failure};
 use crate::output::{self, Detail, ShownResult};
 use crate::progress::{Progress, ShownProgress, say};
-use crate::request_id::RequestId;
 use crate::resolved::{Run, RunLocation};
-use crate::results_directory::ResultsDirectory;
 use crate::signals;
-use crate::{cost, other_version, report_directory, result_status, unsearched_groups, warnings};
+use crate::user;
+use crate::{cost, program, report_directory, unsearched_groups, warnings};
 
 /// Runs the job, or shows the result of an earlier run.
 pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, CommandFailure> {
@@ -42,7 +41,7 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
     if let RunLocation::Coordinator(remote) = &run.location
         && !is_quiet
     {
-        remote.announce();
+        user::announce(remote);
     }
     unsearched_groups::warn(input.path(), &noted);
     warnings::say_of_job(specification, &noted.warnings).await;
@@ -67,29 +66,12 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
         return show(&run, specification, &result);
     }
     let shown = ShownProgress { format: run.progress, verbosity: run.verbosity };
-    let job = NamedJob { specification, name: &run.name, progress: shown };
-    let fetched = match location {
-        ConnectedLocation::Local { workers, threads } => {
-            let store = directory.as_ref().map_or(StoreLocation::Memory, |directory| {
-                StoreLocation::Directory(directory.store())
-            });
-            let setup = EmbeddedSetup { store, workers, threads, page: run.page, keep_ended: None };
-            run_locally(setup, job, directory.as_ref(), interruption).await?
-        }
-        ConnectedLocation::Coordinator(client) => {
-            run_on_coordinator(*client, job, directory.as_ref(), interruption).await?
-        }
-    };
+    let program = program::current();
+    let job =
+        JobRun { specification, name: &run.name, directory: directory.as_ref(), program: &program };
+    let fetched = run_at(location, run.page, job, shown, interruption).await?;
     let result = keep(run.kind, &fetched, directory.as_ref())?;
     show(&run, specification, &result)
-}
-
-/// A job, its name for display, and the format of its progress.
-#[derive(Clone, Copy)]
-struct NamedJob<'a> {
-    specification: &'a JobSpecification,
-    name: &'a str,
-    progress: ShownProgress,
 }
 
 /// Where a job is computed; a coordinator is already connected.
@@ -106,7 +88,7 @@ impl ConnectedLocation {
                 Self::Local { workers: *workers, threads: *threads }
             }
             RunLocation::Coordinator(remote) => {
-                let client = Client::connect(remote).await?;
+                let client = user::connect(remote).await?;
                 Self::Coordinator(Box::new(client))
             }
         })
@@ -118,7 +100,7 @@ fn finished(
     specification: &JobSpecification,
 ) -> Result<Option<ResultFile>, CommandFailure> {
     match &run.out {
-        Some(path) => ResultsDirectory::finished(path, specification),
+        Some(path) => Ok(ResultsDirectory::finished(path, specification)?),
         None => Ok(None),
     }
 }
@@ -152,7 +134,7 @@ fn keep(
         return Err(CommandFailure::failed(anyhow!(missing)));
     }
     match directory {
-        Some(directory) => directory.write_results(kind, fetched),
+        Some(directory) => Ok(directory.write_results(kind, fetched, &*user::listener())?),
         None => Ok(ResultFile::from_job(kind, &fetched.result)),
     }
 }
@@ -172,93 +154,53 @@ fn show(
     if let Some(directory) = run.out.as_deref().filter(|_| run.report) {
         report_directory::write_beside(directory)?;
     }
-    Ok(result_status::exit_status(specification, result))
+    Ok(ExitStatus::of_result(specification, result))
 }
 
-/// Runs the job on worker processes of this process.
-async fn run_locally(
-    setup: EmbeddedSetup,
-    job: NamedJob<'_>,
-    directory: Option<&ResultsDirectory>,
+/// Runs the job at a place until it has ended or the user interrupts it.
+async fn run_at(
+    location: ConnectedLocation,
+    page: Option<SocketAddr>,
+    job: JobRun<'_>,
+    shown: ShownProgress,
     interruption: impl Future<Output = Interruption>,
 ) -> Result<Fetched, CommandFailure> {
-    let progress = Arc::new(AtomicU64::new(0));
-    let mut embedded = Embedded::start(setup, Arc::clone(&progress)).await?;
-    if let Some(url) = embedded.page_url() {
-        say(&format!("live page: {url} (until the run ends)"));
-    }
-    let endpoint = embedded.endpoint().clone();
-    let (files, unused) = (CredentialFiles::default(), Unused::default());
-    let remote = Remote { endpoint, files, from_environment: false, unused };
-    let driven = async {
-        let client = Client::connect(&remote).await?;
-        let note = |snapshot: &JobSnapshot| {
-            let done = snapshot.evaluations.wrapping_mul(snapshot.realizations);
-            progress.store(done.wrapping_add(snapshot.realizations_done), Ordering::Relaxed);
-        };
-        drive(client, job, directory, note).await
-    };
-    let result = tokio::select! {
-        driven = driven => driven,
-        failure = embedded.failed() => Err(failure),
-        interruption = interruption => Err(CommandFailure::Interrupted(interruption, match directory {
-            Some(_) => "run the same command again to resume",
-            None => "no results were saved (with --out DIR a run can be resumed)",
-        })),
-    };
-    embedded.end().await;
-    result
-}
-
-/// Runs the job on a running coordinator.
-async fn run_on_coordinator(
-    client: Client,
-    job: NamedJob<'_>,
-    directory: Option<&ResultsDirectory>,
-    interruption: impl Future<Output = Interruption>,
-) -> Result<Fetched, CommandFailure> {
-    tokio::select! {
-        driven = drive(client, job, directory, |_| {}) => driven,
-        interruption = interruption => Err(CommandFailure::Interrupted(
-            interruption,
-            "a job that was accepted continues (see `osteon jobs`, `osteon cancel`)",
-        )),
-    }
-}
-
-/// Submits the job, follows it and fetches its results.
-async fn drive(
-    mut client: Client,
-    NamedJob { specification, name, progress }: NamedJob<'_>,
-    directory: Option<&ResultsDirectory>,
-    note: impl Fn(&JobSnapshot),
-) -> Result<Fetched, CommandFailure> {
-    let request = match directory {
-        Some(directory) => directory.request()?,
-        None => RequestId::new().map_err(CommandFailure::failed)?,
-    };
-    let options = SubmitOptions { name: name.to_owned(), ..SubmitOptions::default() };
-    let job = client.submit(specification, &request, options).await?;
-    if let Some(directory) = directory {
-        directory.write_job(specification)?;
-    }
-    let mut progress = Progress::start(specification, progress);
-    client
-        .watch(&job, |snapshot| {
-            note(snapshot);
-            // Whoever started this run has ended, and its result would be lost.
-            progress.show(snapshot).map_err(|_| {
-                let left = "the program that reads the progress has closed stderr";
-                CommandFailure::Interrupted(Interruption::Terminated, left)
-            })
+    let mut progress = Progress::start(job.specification, shown);
+    // Whoever started this run has ended, and its result would be lost.
+    let show = |snapshot: &JobSnapshot| {
+        progress.show(snapshot).map_err(|_| {
+            let left = "the program that reads the progress has closed stderr";
+            CommandFailure::Interrupted(Interruption::Terminated, left)
         })
-        .await?;
+    };
+    let fetched = match location {
+        ConnectedLocation::Local { workers, threads } => {
+            let left = match job.directory {
+                Some(_) => "run the same command again to resume",
+                None => "no results were saved (with --out DIR a run can be resumed)",
+            };
+            let stop = async { CommandFailure::Interrupted(interruption.await, left) };
+            let setup = EmbeddedSetup {
+                executable: program::executable()?,
+                commit: program::COMMIT,
+                store: job.directory.map_or(StoreLocation::Memory, |directory| {
+                    StoreLocation::Directory(directory.store())
+                }),
+                workers,
+                threads,
+                page,
+                keep_ended: None,
+            };
+            run::run_locally(setup, job, user::listener(), show, stop).await
+        }
+        ConnectedLocation::Coordinator(mut client) => tokio::select! {
+            fetched = run::run(&mut client, job, show) => fetched,
+            interruption = interruption => Err(CommandFailure::Interrupted(
+                interruption,
+                "a job that was accepted continues (see `osteon jobs`, `osteon cancel`)",
+            )),
+        },
+    };
     progress.finish();
-    let fetched = client.fetch(&job).await?;
-    let Fetched { specification: computed, result, .. } = &fetched;
-    let note = other_version::check(specification, computed, &result.program);
-    if let Some(note) = note.map_err(CommandFailure::failed)? {
-        say(&note);
-    }
-    Ok(fetched)
+    fetched
 }

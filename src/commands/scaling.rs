@@ -4,17 +4,18 @@
 
 use std::time::Instant;
 
+use osteon_client::client::{ClientError, Remote};
 use osteon_proto::v1::JobState;
 use tokio::time::sleep;
 use tracing::{info, warn};
 
-use crate::client::{Client, ClientError, Remote};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::resolved::{OutputFormat, ScalingPlan};
 use crate::slurm::queue::{LASTING, QueuedWorker};
 use crate::slurm::scaling::{self, QueueObservation, Scaling, ScalingAction};
 use crate::slurm::{SlurmError, programs};
+use crate::user;
 
 use super::slurm::check_workers;
 
@@ -89,7 +90,7 @@ async fn look(
     let names = [names.elastic.as_str(), names.lasting.as_str()];
     let queue = programs::queue(&names).await.map_err(CommandFailure::failed)?;
     let jobs = async {
-        let mut client = Client::connect(&plan.coordinator).await?;
+        let mut client = user::connect(&plan.coordinator).await?;
         client.list().await
     };
     let jobs = jobs.await.map_err(|error: ClientError| CommandFailure::from(error))?;

@@ -1,5 +1,6 @@
 //! `slurm script` and `slurm array`: print batch scripts.
 
+use osteon_client::results_directory::ResultsDirectory;
 use osteon_files::job_file;
 use osteon_proto::credentials::Credentials;
 use osteon_proto::endpoint::Endpoint;
@@ -8,7 +9,6 @@ use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::progress::say;
 use crate::resolved::{OutputFormat, WorkerArray};
-use crate::results_directory::ResultsDirectory;
 use crate::slurm::job_script::JobScript;
 use crate::slurm::worker_script::WorkerScript;
 

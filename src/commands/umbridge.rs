@@ -6,21 +6,20 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
+use osteon_client::client::Remote;
+use osteon_client::embedded::{Embedded, EmbeddedSetup, StoreLocation};
 use osteon_common::job::JobKind;
 use osteon_coordinator::service::open_files;
 use osteon_files::job_file::{self, FilePurpose};
-use osteon_proto::credentials::CredentialFiles;
 
-use crate::client::{Client, Remote};
-use crate::embedded::{Embedded, EmbeddedSetup, StoreLocation};
-use crate::environment::Unused;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::progress::say;
 use crate::resolved::{ModelService, OutputFormat, RunLocation};
 use crate::signals;
 use crate::umbridge::{Evaluator, ModelListener, ServedJob, router};
-use crate::warnings;
+use crate::user;
+use crate::{program, warnings};
 
 /// Time that an embedded coordinator keeps evaluated points: long enough to be fetched.
 const KEPT: Duration = Duration::from_secs(60);
@@ -44,22 +43,29 @@ pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFa
     let mut embedded = None;
     let remote = match location {
         RunLocation::Coordinator(remote) => {
-            remote.announce();
+            user::announce(&remote);
             remote
         }
         RunLocation::Local { workers, threads } => {
             open_files::require_for_run(workers).map_err(CommandFailure::failed)?;
             let (store, keep_ended) = (StoreLocation::Memory, Some(KEPT));
-            let setup = EmbeddedSetup { store, workers, threads, page: None, keep_ended };
-            let started = Embedded::start(setup, Arc::clone(&evaluated)).await?;
-            let (files, unused) = (CredentialFiles::default(), Unused::default());
+            let setup = EmbeddedSetup {
+                executable: program::executable()?,
+                commit: program::COMMIT,
+                store,
+                workers,
+                threads,
+                page: None,
+                keep_ended,
+            };
+            let started = Embedded::start(setup, Arc::clone(&evaluated), user::listener()).await?;
             let endpoint = started.endpoint().clone();
             embedded = Some(started);
-            Remote { endpoint, files, from_environment: false, unused }
+            Remote::at(endpoint)
         }
     };
     let served = async {
-        let client = Client::connect(&remote).await?;
+        let client = user::connect(&remote).await?;
         let evaluator = Evaluator::new(client, evaluated);
         let models = Arc::new(ServedJob::new(noted.specification, evaluator.clone(), isa));
         say(&format!("serving {}; Ctrl-C ends it", models.models().join(", ")));
@@ -89,7 +95,7 @@ pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFa
 /// Completes when embedded workers or their coordinator cannot continue; never, if there are none.
 async fn failed(embedded: &mut Option<Embedded>) -> CommandFailure {
     match embedded {
-        Some(embedded) => embedded.failed().await,
+        Some(embedded) => embedded.failed().await.into(),
         None => pending().await,
     }
 }

@@ -1,11 +1,11 @@
 //! `worker`: computes for a coordinator until it is asked to leave.
 
 use anyhow::anyhow;
+use osteon_client::environment::Unused;
 use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
 use osteon_worker::{WorkerConfig, WorkerError};
 use tonic::Code;
 
-use crate::environment::Unused;
 use crate::exit_status::{CommandFailure, ExitStatus};
 use crate::signals;
 use crate::telemetry;

@@ -2,8 +2,10 @@
 
 use std::time::{Duration, Instant};
 
+use osteon_client::client::Remote;
+use osteon_client::operators;
+
 use super::Diagnosis;
-use crate::client::{Remote, operators};
 
 const CHECK: &str = "coordinator";
 /// Longest wait for the answer.

@@ -19,6 +19,7 @@ mod solver;
 use std::io::{self, Write};
 use std::path::Path;
 
+use osteon_client::client;
 use osteon_common::visible;
 use osteon_proto::v1::{
     BackupEnd, BannedWorker, ExplainResponse, JobKind, JobSnapshot, JobState, ListWorkersResponse,
@@ -28,7 +29,6 @@ use osteon_proto::v1::{
 use self::layout::{WIDTH, aligned, glued};
 use self::number::significant;
 use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation};
-use crate::client;
 use crate::doctor::Diagnosis;
 use crate::progress::{JobProgress, line, span};
 

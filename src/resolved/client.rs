@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use osteon_client::client::{Remote, SubmitOptions};
+use osteon_client::request_id::RequestId;
 use osteon_common::job::JobKind;
 
 use super::{Resolved, format, slurm};
@@ -10,9 +12,7 @@ use crate::arguments::{
     JobArguments, JobsArguments, JobsCommand, SubmitArguments, WatchArguments, WorkersArguments,
     WorkersCommand,
 };
-use crate::client::{Remote, SubmitOptions};
 use crate::exit_status::CommandFailure;
-use crate::request_id::RequestId;
 
 /// Finds the coordinator that the arguments or the environment name.
 pub(super) trait FindCoordinator:

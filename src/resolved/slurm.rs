@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
+use osteon_client::client::Remote;
 use osteon_common::job::JobKind;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::endpoint::Endpoint;
@@ -12,7 +13,6 @@ use crate::arguments::{
     AllocationArguments, ClientArguments, JobScriptArguments, ScalingArguments, SlurmArguments,
     SlurmCommand, WorkerArrayArguments,
 };
-use crate::client::Remote;
 use crate::exit_status::CommandFailure;
 use crate::slurm::job_script::JobScript;
 use crate::slurm::scaling::ScalingPolicy;

@@ -3,12 +3,12 @@
 use std::net::SocketAddr;
 
 use anyhow::anyhow;
+use osteon_client::environment::Environment;
 use osteon_coordinator::OwnHosts;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_solver::Isa;
 
 use crate::arguments::{JobFileArguments, UmbridgeArguments};
-use crate::environment::Environment;
 use crate::exit_status::CommandFailure;
 
 use super::{Locating, RunLocation};

@@ -5,6 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use osteon_client::client::{Client, ClientError, Fetched, SubmitOptions};
+use osteon_client::other_version;
+use osteon_client::request_id::RequestId;
 use osteon_common::job::JobSpecification;
 use osteon_common::moments::Estimate;
 use osteon_common::outcome::{FailureCounts, Outcome};
@@ -13,11 +16,8 @@ use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
-use crate::client::{Client, ClientError, Fetched, SubmitOptions};
-use crate::other_version;
-use crate::request_id::RequestId;
-
 use super::protocol_error::ProtocolError;
+use crate::program;
 
 /// Maximum number of points that are evaluated at a time; others wait. More than a coordinator works
 /// on at a time, so that it always has a next one.
@@ -149,7 +149,7 @@ fn refused(error: ClientError) -> ProtocolError {
 /// Returns what a job has computed.
 fn result_of(job: &JobSpecification, fetched: Fetched) -> Result<PointResult, ProtocolError> {
     let Fetched { specification: computed, result, .. } = fetched;
-    other_version::check(job, &computed, &result.program)
+    other_version::check(job, &computed, (&program::current(), &result.program))
         .map_err(|error| ProtocolError::output(error.to_string()))?;
     let Some(best) = result.best else {
         let reason = result.reason.unwrap_or_else(|| "the job was cancelled".to_owned());
@@ -192,8 +192,8 @@ mod tests {
     use tokio::time::sleep;
 
     use super::*;
-    use crate::client::{self, Remote};
-    use crate::environment::Unused;
+    use osteon_client::client::{self, Remote};
+    use osteon_client::environment::Unused;
 
     /// Forwards one connection; while `held` is true, answers wait.
     async fn holds_answers(from: UnixListener, to: PathBuf, mut held: watch::Receiver<bool>) {
@@ -220,7 +220,7 @@ mod tests {
         let (files, unused) = (CredentialFiles::default(), Unused::default());
         let endpoint = Endpoint::Unix(socket.to_owned());
         let remote = Remote { endpoint, files, from_environment: false, unused };
-        Client::connect(&remote).await.unwrap()
+        crate::user::connect(&remote).await.unwrap()
     }
 
     /// Polls until `witness` sees one job of which `wanted` is true.

@@ -1,5 +1,6 @@
 //! Tables of jobs and workers as text.
 
+use osteon_client::client;
 use osteon_common::results::Status;
 use osteon_common::visible;
 use osteon_proto::timestamp;
@@ -12,7 +13,6 @@ use unicode_width::UnicodeWidthStr as _;
 
 use super::layout::{INDENT, WIDTH, glued, wrapped};
 use super::{kind_name, progress, state_name};
-use crate::client;
 use crate::output::times::utc;
 use crate::progress::span;
 

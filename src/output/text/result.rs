@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use osteon_client::result_status;
 use osteon_common::job::{JobSpecification, Objective, Range};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::{Parameter, Point};
@@ -15,7 +16,6 @@ use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};
 use super::{data_notes, details, fit, groups, identified, posterior, solver};
 use crate::output::{Detail, ShownResult};
-use crate::result_status;
 
 /// Returns the table.
 pub(super) fn table(shown: &ShownResult<'_>) -> String {

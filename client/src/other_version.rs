@@ -4,33 +4,30 @@ use anyhow::bail;
 use osteon_common::job::JobSpecification;
 use osteon_common::version::Program;
 
-use crate::program;
-
-/// Checks that the job that the program `there` has computed is the one that was submitted. Returns a note
-/// for the user if its numbers may differ from those of this program.
+/// Checks that the job that the program `there` has computed is the one that was submitted by the program `here`.
+/// Returns a note for the user if its numbers may differ.
 ///
 /// # Errors
 /// When it has computed another job. A coordinator of an earlier version drops the fields of a message that
 /// it does not know.
-pub(crate) fn check(
+pub fn check(
     submitted: &JobSpecification,
     computed: &JobSpecification,
-    there: &Program,
+    (here, there): (&Program, &Program),
 ) -> anyhow::Result<Option<String>> {
-    let here = program::current();
     if computed != submitted {
         bail!(
             "the coordinator ({}) has computed another job than this program ({}) has submitted: it does \
              not know all of its keys; use the same version for both",
             shown(there),
-            shown(&here)
+            shown(here)
         );
     }
     Ok((here.numerics != there.numerics).then(|| {
         format!(
             "computed by {}; this program is {}, whose velocities may differ slightly",
             shown(there),
-            shown(&here)
+            shown(here)
         )
     }))
 }
@@ -48,28 +45,32 @@ mod tests {
 
     use super::*;
 
+    fn here() -> Program {
+        Program::current(None)
+    }
+
     fn example() -> JobSpecification {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/quick.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/quick.toml");
         job_file::read(&path, JobKind::Propagation).unwrap()
     }
 
     #[test]
     fn a_job_of_which_a_part_was_dropped_is_an_error() {
         let submitted = example();
-        assert_eq!(check(&submitted, &submitted, &program::current()).unwrap(), None);
+        assert_eq!(check(&submitted, &submitted, (&here(), &here())).unwrap(), None);
         let mut computed = submitted.clone();
         computed.monte_carlo.seed += 1;
-        let there = Program { version: "0.0.9".to_owned(), ..program::current() };
-        let error = check(&submitted, &computed, &there).unwrap_err().to_string();
+        let there = Program { version: "0.0.9".to_owned(), ..Program::current(None) };
+        let error = check(&submitted, &computed, (&here(), &there)).unwrap_err().to_string();
         assert!(error.contains("osteon 0.0.9, numerics"), "{error}");
         assert!(error.contains("same version"), "{error}");
     }
 
     #[test]
     fn other_numerics_are_noted() {
-        let here = program::current();
-        let there = Program { numerics: here.numerics + 1, ..here };
-        let note = check(&example(), &example(), &there).unwrap().unwrap();
+        let there = Program { numerics: here().numerics + 1, ..here() };
+        let note =
+            check(&example(), &example(), (&Program::current(None), &there)).unwrap().unwrap();
         assert!(note.contains(&format!("numerics {}; this", there.numerics)), "{note}");
     }
 }

@@ -4,14 +4,12 @@ use std::ffi::OsString;
 use std::fmt;
 use std::path::PathBuf;
 
-use anyhow::anyhow;
 use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint::Endpoint;
-
-use crate::exit_status::CommandFailure;
+use osteon_proto::endpoint::{Endpoint, EndpointError};
+use thiserror::Error;
 
 /// The variable with the address of the coordinator.
-pub(crate) const COORDINATOR: &str = "OSTEON_COORDINATOR";
+pub const COORDINATOR: &str = "OSTEON_COORDINATOR";
 const TLS_CA: &str = "OSTEON_TLS_CA";
 const TLS_CERT: &str = "OSTEON_TLS_CERT";
 const TLS_KEY: &str = "OSTEON_TLS_KEY";
@@ -20,11 +18,30 @@ const TOKEN_FILE: &str = "OSTEON_TOKEN_FILE";
 const HOST: &str = "OSTEON_HOST";
 
 /// The variables that name credential files.
-pub(crate) const FILES: [&str; 4] = [TLS_CA, TLS_CERT, TLS_KEY, TOKEN_FILE];
+pub const FILES: [&str; 4] = [TLS_CA, TLS_CERT, TLS_KEY, TOKEN_FILE];
+
+/// Reason why the variables name no coordinator that can be used.
+#[derive(Debug, Error)]
+pub enum EnvironmentError {
+    /// A value is not text.
+    #[error("in {variable}: {value:?} is not valid UTF-8")]
+    NotUnicode {
+        /// The variable.
+        variable: &'static str,
+        /// Its value.
+        value: OsString,
+    },
+    /// The value is not an address.
+    #[error("in {COORDINATOR}: {0}")]
+    Address(EndpointError),
+    /// Neither an option nor the environment names a coordinator.
+    #[error("no coordinator is given; use --coordinator URL or set {COORDINATOR}")]
+    NoCoordinator,
+}
 
 /// The values of the variables. An option takes precedence, and an empty variable counts as unset.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Environment {
+pub struct Environment {
     coordinator: Option<String>,
     host: Option<String>,
     files: CredentialFiles,
@@ -35,7 +52,7 @@ impl Environment {
     ///
     /// # Errors
     /// If the coordinator's address or the name of the machine is not valid Unicode.
-    pub(crate) fn from_process() -> Result<Self, CommandFailure> {
+    pub fn from_process() -> Result<Self, EnvironmentError> {
         Self::read(|name| std::env::var_os(name))
     }
 
@@ -43,15 +60,12 @@ impl Environment {
     ///
     /// # Errors
     /// Same as [`from_process`](Self::from_process).
-    pub(crate) fn read(
-        variable: impl Fn(&str) -> Option<OsString>,
-    ) -> Result<Self, CommandFailure> {
+    pub fn read(variable: impl Fn(&str) -> Option<OsString>) -> Result<Self, EnvironmentError> {
         let given = |name| variable(name).filter(|value| !value.is_empty());
         let file = |name| given(name).map(PathBuf::from);
         let text = |name| {
-            given(name).map(OsString::into_string).transpose().map_err(|value| {
-                CommandFailure::bad_input(anyhow!("in {name}: {value:?} is not valid UTF-8"))
-            })
+            let text = given(name).map(OsString::into_string).transpose();
+            text.map_err(|value| EnvironmentError::NotUnicode { variable: name, value })
         };
         Ok(Self {
             coordinator: text(COORDINATOR)?,
@@ -66,7 +80,7 @@ impl Environment {
     }
 
     /// Returns the name of a worker's machine, if there is one.
-    pub(crate) fn host(&self) -> Option<String> {
+    pub fn host(&self) -> Option<String> {
         self.host.clone()
     }
 
@@ -74,27 +88,19 @@ impl Environment {
     ///
     /// # Errors
     /// If the value is not an address.
-    pub(crate) fn coordinator(&self) -> Result<Option<Endpoint>, CommandFailure> {
+    pub fn coordinator(&self) -> Result<Option<Endpoint>, EnvironmentError> {
         let parsed = self.coordinator.as_deref().map(str::parse::<Endpoint>).transpose();
-        parsed.map_err(|error| {
-            CommandFailure::bad_input(
-                anyhow::Error::new(error).context(format!("in {COORDINATOR}")),
-            )
-        })
+        parsed.map_err(EnvironmentError::Address)
     }
 
     /// Returns the coordinator of a command that requires one.
     ///
     /// # Errors
     /// If neither the option nor the environment names one.
-    pub(crate) fn needed(&self, option: Option<Endpoint>) -> Result<Endpoint, CommandFailure> {
+    pub fn needed(&self, option: Option<Endpoint>) -> Result<Endpoint, EnvironmentError> {
         match option {
             Some(endpoint) => Ok(endpoint),
-            None => self.coordinator()?.ok_or_else(|| {
-                CommandFailure::bad_input(anyhow!(
-                    "no coordinator is given; use --coordinator URL or set {COORDINATOR}"
-                ))
-            }),
+            None => self.coordinator()?.ok_or(EnvironmentError::NoCoordinator),
         }
     }
 
@@ -102,7 +108,7 @@ impl Environment {
     /// is no option and the address can use them, those of the environment. Certificate and key are
     /// always taken from the same source. If the environment names another coordinator, its files
     /// belong to that one: they are not used, so that a stranger never receives their token.
-    pub(crate) fn files(
+    pub fn files(
         &self,
         options: CredentialFiles,
         endpoint: &Endpoint,
@@ -146,7 +152,7 @@ fn is_at(text: &str, endpoint: &Endpoint) -> bool {
 /// Variables that were not used because the environment names a different coordinator from the
 /// command line; may be empty.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Unused(Vec<(&'static str, &'static str)>);
+pub struct Unused(Vec<(&'static str, &'static str)>);
 
 impl Unused {
     fn from_files(files: &CredentialFiles) -> Self {
@@ -161,7 +167,7 @@ impl Unused {
     }
 
     /// Returns whether no variable was left unused.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 }
@@ -221,7 +227,6 @@ mod tests {
             [(None, "--coordinator URL"), (Some(""), "--coordinator URL"), (Some("b"), "`b`")]
         {
             let failure = resolved(None, variable).unwrap_err();
-            assert_eq!(failure.exit_code(), 2);
             assert!(failure.to_string().contains(expected), "{failure}");
         }
     }

@@ -12,14 +12,15 @@ use anyhow::Context as _;
 use osteon_coordinator::store::Store;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
-use osteon_coordinator::{Config, Coordinator, ListenAddress, Listener};
+use osteon_coordinator::{Config, Coordinator, ListenAddress};
 use osteon_proto::endpoint::Endpoint;
 use tempfile::TempDir;
 
 use crate::embedded::workers::Workers;
-use crate::exit_status::CommandFailure;
-use crate::program;
-use crate::telemetry;
+use crate::listener::RunListener;
+use crate::run_error::RunError;
+
+pub use crate::embedded::workers::BAD_MACHINE;
 
 /// Longest path of a temporary directory that leaves room for the socket's name, bytes.
 const TEMPORARY_BYTES_MAX: usize = 70;
@@ -28,7 +29,7 @@ const STORE_PATIENCE_S: u64 = 10;
 
 /// Storage of the coordinator's jobs.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum StoreLocation {
+pub enum StoreLocation {
     /// In memory: the jobs are lost when the process ends.
     Memory,
     /// In a directory, so that an interrupted run can be resumed.
@@ -37,21 +38,25 @@ pub(crate) enum StoreLocation {
 
 /// What is started.
 #[derive(Debug)]
-pub(crate) struct EmbeddedSetup {
+pub struct EmbeddedSetup {
+    /// The program `osteon`, for the workers.
+    pub executable: PathBuf,
+    /// The commit from which this program was built, if it is known; results state it.
+    pub commit: Option<&'static str>,
     /// Storage of the jobs.
-    pub(crate) store: StoreLocation,
+    pub store: StoreLocation,
     /// Number of worker processes.
-    pub(crate) workers: u32,
+    pub workers: u32,
     /// Number of threads of each worker.
-    pub(crate) threads: u32,
+    pub threads: u32,
     /// Address of the live page, on this machine only; `None`: no page.
-    pub(crate) page: Option<SocketAddr>,
+    pub page: Option<SocketAddr>,
     /// Ended jobs are deleted after this time; `None`: they are kept.
-    pub(crate) keep_ended: Option<Duration>,
+    pub keep_ended: Option<Duration>,
 }
 
 /// A coordinator and its workers.
-pub(crate) struct Embedded {
+pub struct Embedded {
     coordinator: Coordinator,
     workers: Workers,
     endpoint: Endpoint,
@@ -61,43 +66,45 @@ pub(crate) struct Embedded {
 
 impl Embedded {
     /// Starts coordinator and workers. `progress` increases whenever the workers have completed
-    /// something.
-    pub(crate) async fn start(
+    /// something; the listener learns of workers that end and are started again.
+    ///
+    /// # Errors
+    /// If the socket, the store or the page cannot be opened.
+    pub async fn start(
         setup: EmbeddedSetup,
         progress: Arc<AtomicU64>,
-    ) -> Result<Self, CommandFailure> {
+        listener: Arc<dyn RunListener>,
+    ) -> Result<Self, RunError> {
         let EmbeddedSetup { workers, threads, .. } = setup;
-        let directory = private_directory().map_err(CommandFailure::Failed)?;
+        let executable = setup.executable.clone();
+        let directory = private_directory().map_err(RunError::Failed)?;
         let socket = directory.path().join("socket");
         let endpoint = Endpoint::Unix(socket.clone());
-        let executable = std::env::current_exe()
-            .context("cannot find this program to start workers")
-            .map_err(CommandFailure::Failed)?;
-        let coordinator = start_coordinator(setup, socket).await?;
-        let workers = Workers::start(executable, &endpoint, workers, threads, progress);
+        let coordinator = start_coordinator(setup, socket, &*listener).await?;
+        let workers = Workers::start(executable, &endpoint, (workers, threads), progress, listener);
         Ok(Self { coordinator, workers, endpoint, _directory: directory })
     }
 
     /// Returns the address of the coordinator.
-    pub(crate) fn endpoint(&self) -> &Endpoint {
+    pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
     /// Returns the URL of the live page, if there is one.
-    pub(crate) fn page_url(&self) -> Option<&str> {
+    pub fn page_url(&self) -> Option<&str> {
         self.coordinator.page_url()
     }
 
     /// Completes when the workers or the coordinator cannot continue.
-    pub(crate) async fn failed(&mut self) -> CommandFailure {
+    pub async fn failed(&mut self) -> RunError {
         tokio::select! {
             failure = self.workers.failed() => failure,
-            failed = self.coordinator.failed() => CommandFailure::failed(failed),
+            failed = self.coordinator.failed() => RunError::failed(failed),
         }
     }
 
     /// Ends and reaps the workers, then ends the coordinator.
-    pub(crate) async fn end(mut self) {
+    pub async fn end(mut self) {
         // The coordinator first: it would report workers that are ended with batches as lost.
         self.workers.mute();
         self.coordinator.drain().await;
@@ -109,14 +116,15 @@ impl Embedded {
 async fn start_coordinator(
     setup: EmbeddedSetup,
     socket: PathBuf,
-) -> Result<Coordinator, CommandFailure> {
-    let EmbeddedSetup { store, page, keep_ended, .. } = setup;
-    let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
-    let listener = listener.map_err(CommandFailure::failed)?.with_spans(telemetry::recorder());
+    user: &dyn RunListener,
+) -> Result<Coordinator, RunError> {
+    let EmbeddedSetup { store, page, keep_ended, commit, .. } = setup;
+    let listener = osteon_coordinator::Listener::bind(&ListenAddress::Unix(socket), false).await;
+    let listener = listener.map_err(RunError::failed)?.with_spans(user.spans());
     let listener = match page {
         None => listener,
         Some(page) => {
-            listener.with_page(page, false, Vec::new()).await.map_err(CommandFailure::failed)?
+            listener.with_page(page, false, Vec::new()).await.map_err(RunError::failed)?
         }
     };
     let store: Box<dyn Store + Send> = match store {
@@ -124,13 +132,12 @@ async fn start_coordinator(
         // Lost jobs are accepted here: this process submits its job again, and it is recomputed.
         StoreLocation::Directory(path) => {
             let store = SqliteStore::open_with(&path, LostJobs::Accept);
-            Box::new(store.map_err(CommandFailure::failed)?)
+            Box::new(store.map_err(RunError::failed)?)
         }
     };
     let store_give_up_after = Some(Duration::from_secs(STORE_PATIENCE_S));
-    let config =
-        Config { store_give_up_after, keep_ended, commit: program::COMMIT, ..Config::default() };
-    osteon_coordinator::start(listener, store, config).await.map_err(CommandFailure::failed)
+    let config = Config { store_give_up_after, keep_ended, commit, ..Config::default() };
+    osteon_coordinator::start(listener, store, config).await.map_err(RunError::failed)
 }
 
 /// Creates a directory that only this user can enter.

@@ -5,37 +5,35 @@ use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::results::Status;
 use osteon_files::report::{Propagation, ResultFile};
 
-use crate::client::Fetched;
-use crate::exit_status::ExitStatus;
+use crate::fetched::Fetched;
 
-/// Returns the ending of a command, and thus the exit code, for this result.
-pub(crate) fn exit_status(specification: &JobSpecification, result: &ResultFile) -> ExitStatus {
-    let done = match result {
+/// Returns whether the run has a complete result: it was neither cancelled, nor has it failed.
+pub fn is_complete(specification: &JobSpecification, result: &ResultFile) -> bool {
+    match result {
         ResultFile::Identification(found) => found.status.is_complete(),
         ResultFile::Propagation(found) => propagation_failure(specification, found).is_none(),
-    };
-    if done { ExitStatus::Done } else { ExitStatus::RunFailed }
+    }
 }
 
 /// Returns whether the run was cancelled, in which case running it again continues it.
-pub(crate) fn is_cancelled(result: &ResultFile) -> bool {
+pub fn is_cancelled(result: &ResultFile) -> bool {
     result.status() == Some(Status::Cancelled)
 }
 
 /// Returns whether running the job again may end otherwise: the run was cancelled, or failed
 /// because of the machines that it ran on.
-pub(crate) fn is_worth_repeating(result: &ResultFile) -> bool {
+pub fn is_worth_repeating(result: &ResultFile) -> bool {
     is_cancelled(result) || machine_failure(result).is_some()
 }
 
 /// Returns the reason why a run failed, if the machines that it ran on are the cause.
-pub(crate) fn machine_failure(result: &ResultFile) -> Option<&str> {
+pub fn machine_failure(result: &ResultFile) -> Option<&str> {
     let (failure, reason) = result.failure()?;
     failure.is_retryable().then(|| reason.unwrap_or(failure.name()))
 }
 
 /// Returns the reason why the result of a propagation is a failure; `None` if it is not one.
-pub(crate) fn propagation_failure(
+pub fn propagation_failure(
     specification: &JobSpecification,
     result: &Propagation,
 ) -> Option<String> {
@@ -56,7 +54,7 @@ pub(crate) fn propagation_failure(
 
 /// Returns the reason why an ended job has no result to show or to keep; `None` if it has one. A
 /// propagation has none until its only evaluation is complete, a search has one from its start.
-pub(crate) fn missing_result(fetched: &Fetched) -> Option<String> {
+pub fn missing_result(fetched: &Fetched) -> Option<String> {
     if fetched.specification.kind == JobKind::Identification || fetched.result.best.is_some() {
         return None;
     }

@@ -1,5 +1,6 @@
 //! Requests of operators: workers, what delays a job, health, and a copy of the store.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_proto::credentials::CredentialFiles;
@@ -14,38 +15,41 @@ use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 
-use super::peer::Peer;
-use super::{Client, ClientError, Remote, answer_limit, loaded};
+use crate::client::{Client, loaded};
+use crate::error::ClientError;
+use crate::listener::Silent;
+use crate::peer::Peer;
+use crate::remote::{Remote, answer_limit};
 
 impl Client {
     /// Returns the attached workers, and those that left last.
-    pub(crate) async fn workers(&mut self) -> Result<ListWorkersResponse, ClientError> {
+    pub async fn workers(&mut self) -> Result<ListWorkersResponse, ClientError> {
         let call = self.jobs.list_workers(v1::ListWorkersRequest {});
         self.peer.answered(call).await
     }
 
     /// Returns what decides how fast a job is.
-    pub(crate) async fn explain(&mut self, job: &str) -> Result<ExplainResponse, ClientError> {
+    pub async fn explain(&mut self, job: &str) -> Result<ExplainResponse, ClientError> {
         let call = self.jobs.explain(v1::ExplainRequest { job: job.to_owned() });
         self.peer.answered(call).await
     }
 
     /// Lifts the ban of a host; returns the worker that had been found to compute wrongly.
-    pub(crate) async fn unban(&mut self, host: &str) -> Result<v1::BannedWorker, ClientError> {
+    pub async fn unban(&mut self, host: &str) -> Result<v1::BannedWorker, ClientError> {
         let call = self.jobs.lift_ban(v1::LiftBanRequest { host: host.to_owned() });
         let worker = self.peer.answered(call).await?.worker;
         self.present(worker, "worker")
     }
 
     /// Has an ended job computed again that a banned host contributed to; returns its state afterwards.
-    pub(crate) async fn recheck(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
+    pub async fn recheck(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
         let call = self.jobs.recheck(v1::RecheckRequest { job: job.to_owned() });
         let snapshot = self.peer.answered(call).await?.snapshot;
         self.present(snapshot, "snapshot")
     }
 
     /// Drains a worker; returns its state afterwards.
-    pub(crate) async fn drain(&mut self, worker: u64) -> Result<WorkerSnapshot, ClientError> {
+    pub async fn drain(&mut self, worker: u64) -> Result<WorkerSnapshot, ClientError> {
         let call = self.jobs.drain_worker(v1::DrainWorkerRequest { worker });
         let worker = self.peer.answered(call).await?.worker;
         self.present(worker, "worker")
@@ -53,7 +57,7 @@ impl Client {
 
     /// Passes a copy of the store to `take`, part by part; returns the size and digest that the
     /// whole copy must have. The outer error is that of `take`.
-    pub(crate) async fn backup<E>(
+    pub async fn backup<E>(
         &mut self,
         mut take: impl FnMut(&[u8]) -> Result<(), E>,
     ) -> Result<Result<BackupEnd, ClientError>, E> {
@@ -82,7 +86,7 @@ impl Client {
 
 /// Asks a coordinator once whether it serves, and waits at most `limit`. This requires no token,
 /// and none is sent.
-pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientError> {
+pub async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientError> {
     let Remote { endpoint, files, unused, .. } = remote;
     let files = CredentialFiles { token: None, ..files.clone() };
     let mut patience = Patience::of(limit);
@@ -98,6 +102,6 @@ pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, Cli
         connected.await.map_err(|error: ClientError| error.with_unused_variables(unused))?;
     let mut client = HealthClient::new(connection);
     let call = client.check(HealthCheckRequest::default());
-    let answer = Peer::new(remote).answered_within(&mut patience, call).await?;
+    let answer = Peer::new(remote, Arc::new(Silent)).answered_within(&mut patience, call).await?;
     Ok(answer.status() == ServingStatus::Serving)
 }

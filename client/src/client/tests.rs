@@ -13,10 +13,11 @@ use tokio::time::Instant;
 use tonic::Status;
 
 use super::*;
+use crate::listener::Silent;
 
 #[test]
 fn an_answer_is_told_from_a_loss() {
-    let peer = Peer::new(&at("unix:a".parse().unwrap()));
+    let peer = Peer::new(&at("unix:a".parse().unwrap()), Arc::new(Silent));
     let shown = |status: &Status| peer.refused(status).to_string();
     let answered = Status::unavailable("the store is full");
     assert_eq!(shown(&answered), "the coordinator at unix:a is unavailable: the store is full");
@@ -35,7 +36,7 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
     let endpoint = Endpoint::Unix(socket.clone());
     let remote = at(endpoint);
     let begun = Instant::now();
-    let error = Client::connect(&remote).await.unwrap_err().to_string();
+    let error = connect(&remote).await.unwrap_err().to_string();
     assert!(error.contains("cannot reach") && error.contains("socket"), "{error}");
     let waited = begun.elapsed();
     assert!(waited > answer_limit() * 9 / 10 && waited <= answer_limit(), "{waited:?}");
@@ -44,7 +45,7 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
         sleep(answer_limit() / 2).await;
         tokio::net::UnixListener::bind(&socket).unwrap()
     };
-    let (_listener, connected) = tokio::join!(comes, Client::connect(&remote));
+    let (_listener, connected) = tokio::join!(comes, connect(&remote));
     connected.unwrap();
 }
 
@@ -53,12 +54,15 @@ fn remote(socket: &Path) -> Remote {
 }
 
 fn at(endpoint: Endpoint) -> Remote {
-    let (files, unused) = (CredentialFiles::default(), Unused::default());
-    Remote { endpoint, files, from_environment: false, unused }
+    Remote::at(endpoint)
+}
+
+async fn connect(remote: &Remote) -> Result<Client, ClientError> {
+    Client::connect(remote, Arc::new(Silent)).await
 }
 
 fn example() -> JobSpecification {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/quick.toml"));
+    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/quick.toml"));
     job_file::read(&path, JobKind::Propagation).unwrap()
 }
 
@@ -96,8 +100,8 @@ async fn a_submission_whose_answer_is_lost_makes_one_job() {
     let cut = Arc::new(Notify::new());
     let listener = UnixListener::bind(&between).unwrap();
     let proxy = tokio::spawn(loses_the_first_answer(listener, there.clone(), Arc::clone(&cut)));
-    let mut client = Client::connect(&remote(&between)).await.unwrap();
-    let mut witness = Client::connect(&remote(&there)).await.unwrap();
+    let mut client = connect(&remote(&between)).await.unwrap();
+    let mut witness = connect(&remote(&there)).await.unwrap();
     let (specification, request) = (example(), RequestId::new().unwrap());
     let accepted = async {
         while witness.list().await.unwrap().is_empty() {
@@ -124,7 +128,7 @@ async fn a_submission_that_nobody_answers_says_how_to_find_its_job() {
             drop(listener.accept().await.unwrap());
         }
     });
-    let mut client = Client::connect(&remote(&socket)).await.unwrap();
+    let mut client = connect(&remote(&socket)).await.unwrap();
     let (begun, request) = (Instant::now(), RequestId::new().unwrap());
     let error = client.submit(&example(), &request, SubmitOptions::default()).await.unwrap_err();
     assert!(matches!(error, ClientError::Uncertain { .. }), "{error:?}");
@@ -162,14 +166,14 @@ async fn tls_is_thought_of_only_where_no_answer_ever_came() {
         }
     });
     let remote = at(endpoint);
-    let mut before = Client::connect(&remote).await.unwrap();
+    let mut before = connect(&remote).await.unwrap();
     before.list().await.unwrap();
     broken.notify_one();
     is_broken.notified().await;
     let error = before.list().await.unwrap_err();
     assert!(matches!(error, ClientError::Lost { .. }), "{error:?}");
     assert!(!error.to_string().contains("https://"), "{error}");
-    let mut never = Client::connect(&remote).await.unwrap();
+    let mut never = connect(&remote).await.unwrap();
     let error = never.list().await.unwrap_err().to_string();
     assert!(error.contains("if the coordinator uses TLS, write https://"), "{error}");
     proxy.abort();

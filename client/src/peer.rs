@@ -2,6 +2,7 @@
 //! interprets missing answers and errors.
 
 use std::pin::pin;
+use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_proto::endpoint::{ConnectError, Endpoint};
@@ -11,30 +12,32 @@ use osteon_proto::tls_failure::TlsFailure;
 use tonic::{Code, Response, Status};
 
 use crate::environment::Unused;
-use crate::progress::say;
-
-use super::{ClientError, Remote, SILENCE_S_MAX, answer_limit};
+use crate::error::ClientError;
+use crate::listener::RunListener;
+use crate::remote::{Remote, SILENCE_S_MAX, answer_limit};
 
 /// The coordinator that a client is connected to.
 #[derive(Debug, Clone)]
-pub(super) struct Peer {
+pub(crate) struct Peer {
     /// Its address.
-    pub(super) endpoint: Endpoint,
+    pub(crate) endpoint: Endpoint,
     /// Whether it has ever answered, which shows that client and coordinator use the same protocol.
     ever_answered: bool,
     /// Environment variables that were not used for it.
     unused: Unused,
+    /// Who is told what is waited for.
+    pub(crate) listener: Arc<dyn RunListener>,
 }
 
 impl Peer {
     /// Creates the peer for `remote`, which has not answered yet.
-    pub(super) fn new(remote: &Remote) -> Self {
+    pub(crate) fn new(remote: &Remote, listener: Arc<dyn RunListener>) -> Self {
         let Remote { endpoint, unused, .. } = remote.clone();
-        Self { endpoint, ever_answered: false, unused }
+        Self { endpoint, ever_answered: false, unused, listener }
     }
 
     /// Waits for the answer to `call`, for at most the client's time limit.
-    pub(super) async fn answered<T>(
+    pub(crate) async fn answered<T>(
         &mut self,
         call: impl Future<Output = Result<Response<T>, Status>>,
     ) -> Result<T, ClientError> {
@@ -42,7 +45,7 @@ impl Peer {
     }
 
     /// Waits for the answer to `call`, for as long as there is patience.
-    pub(super) async fn answered_within<T>(
+    pub(crate) async fn answered_within<T>(
         &mut self,
         patience: &mut Patience,
         call: impl Future<Output = Result<Response<T>, Status>>,
@@ -52,7 +55,7 @@ impl Peer {
             let left = limit.saturating_sub(Duration::from_secs(SILENCE_S_MAX)).as_secs_f64();
             format!("no answer from {} yet; waiting for {left:.0} more seconds", self.endpoint)
         };
-        let answer = with_wait_notice(patience.wait_for(call), notice).await;
+        let answer = with_wait_notice(patience.wait_for(call), &*self.listener, notice).await;
         let error = match answer {
             Ok(Ok(response)) => {
                 self.ever_answered = true;
@@ -72,7 +75,7 @@ impl Peer {
     }
 
     /// Returns the error of a coordinator that has not answered within the time limit.
-    pub(super) fn silent(&self) -> ClientError {
+    pub(crate) fn silent(&self) -> ClientError {
         ClientError::Unanswered { endpoint: self.endpoint.clone() }
     }
 
@@ -88,7 +91,7 @@ impl Peer {
     }
 
     /// Interprets the status of a failed call.
-    pub(super) fn refused(&self, status: &Status) -> ClientError {
+    pub(crate) fn refused(&self, status: &Status) -> ClientError {
         if let Some(violations) = status::violations(status) {
             return ClientError::Violations(violations);
         }
@@ -128,8 +131,9 @@ fn hint(status: &Status) -> &'static str {
 }
 
 /// Waits for `call`; after a moment tells the user what is waited for.
-pub(super) async fn with_wait_notice<T>(
+pub(crate) async fn with_wait_notice<T>(
     call: impl Future<Output = T>,
+    listener: &dyn RunListener,
     notice: impl Fn() -> String,
 ) -> T {
     let mut call = pin!(call);
@@ -137,7 +141,7 @@ pub(super) async fn with_wait_notice<T>(
     match Patience::of(silence).wait_for(call.as_mut()).await {
         Ok(answer) => answer,
         Err(_) => {
-            say(&notice());
+            listener.note(&notice());
             call.await
         }
     }

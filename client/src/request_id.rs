@@ -5,11 +5,11 @@ use osteon_proto::identity::{self, NoRandomness};
 
 /// Identifies a submission. A coordinator keeps the ids of different clients apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct RequestId {
+pub struct RequestId {
     /// Id chosen by the submitter; never empty.
-    pub(crate) id: String,
+    pub id: String,
     /// Name of the submitting client.
-    pub(crate) client: String,
+    pub client: String,
 }
 
 impl RequestId {
@@ -17,12 +17,12 @@ impl RequestId {
     ///
     /// # Errors
     /// If the operating system provides no random numbers.
-    pub(crate) fn new() -> Result<Self, NoRandomness> {
+    pub fn new() -> Result<Self, NoRandomness> {
         identity::random_digits::<16>().map(Self::with_id)
     }
 
     /// Creates a request with an id chosen by the user.
-    pub(crate) fn with_id(id: String) -> Self {
+    pub fn with_id(id: String) -> Self {
         Self { id, client: user() }
     }
 }

@@ -1,15 +1,13 @@
 //! A client of the jobs service: every wait is limited, and every error names the coordinator.
 
-pub(crate) mod operators;
-
 use std::panic::resume_unwind;
+use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use osteon_common::job::JobSpecification;
-use osteon_common::results::{Evaluation, JobResult, Status as JobStatus};
-use osteon_common::violations::Violations;
+use osteon_common::results::Status as JobStatus;
 use osteon_proto::choice::JOB_STATUS;
-use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
+use osteon_proto::credentials::{CredentialFiles, Credentials};
 use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
 use osteon_proto::malformed::Malformed;
 use osteon_proto::patience::Patience;
@@ -17,28 +15,23 @@ use osteon_proto::spans::{AttributeValue, OpenSpan, TRACEPARENT, TraceContext};
 use osteon_proto::specification;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{self, JobSnapshot};
-use thiserror::Error;
 use tokio::task::spawn_blocking;
 use tokio::time::sleep;
-use tonic::Code;
 
-use crate::environment::{COORDINATOR, Unused};
-use crate::progress::say;
+use crate::error::ANSWER_S_MAX;
+use crate::listener::RunListener;
+use crate::parts::FetchedParts;
+use crate::peer::{Peer, with_wait_notice};
 use crate::request_id::RequestId;
-use crate::telemetry;
 
-use self::parts::FetchedParts;
-use self::peer::{Peer, with_wait_notice};
+use crate::remote::{SILENCE_S_MAX, answer_limit};
 
-mod parts;
-mod peer;
+pub use crate::error::ClientError;
+pub use crate::fetched::Fetched;
+pub use crate::remote::Remote;
 
 /// Name of the span of a submission.
 const SUBMIT: &str = "osteon.submit";
-/// Longest wait for a coordinator, s.
-const ANSWER_S_MAX: u64 = 10;
-/// Time without a coordinator after which the user is told that the client is waiting for it, s.
-const SILENCE_S_MAX: u64 = 1;
 /// Pause between two attempts to reconnect to a coordinator, ms.
 const RETRY_MS: u64 = 250;
 /// Maximum number of attempts to fetch a result. The coordinator ends a fetch whose reader stands still, as
@@ -47,179 +40,43 @@ const FETCHES_MAX: u32 = 3;
 /// Maximum number of pages of a job list; each holds up to 1000 jobs.
 const PAGES_MAX: usize = 10_000;
 
-/// Reason why a request to a coordinator failed.
-#[derive(Debug, Error)]
-pub(crate) enum ClientError {
-    /// A file of certificates or a token cannot be used.
-    #[error(transparent)]
-    Credentials(#[from] CredentialsError),
-    /// No coordinator could be reached.
-    #[error(transparent)]
-    Connect(#[from] ConnectError),
-    /// The coordinator did not answer in time.
-    #[error("the coordinator at {endpoint} did not answer within {ANSWER_S_MAX} s")]
-    Unanswered {
-        /// Address of the coordinator.
-        endpoint: Endpoint,
-    },
-    /// The connection was lost.
-    #[error("lost the coordinator at {endpoint}: {reason}")]
-    Lost {
-        /// Address of the coordinator.
-        endpoint: Endpoint,
-        /// The transport's error.
-        reason: String,
-    },
-    /// The coordinator cannot serve the request now.
-    #[error("the coordinator at {endpoint} is unavailable: {reason}")]
-    Unavailable {
-        /// Address of the coordinator.
-        endpoint: Endpoint,
-        /// The coordinator's explanation.
-        reason: String,
-    },
-    /// The coordinator rejects the specification.
-    #[error("{}", counted(.0))]
-    Violations(Violations),
-    /// The coordinator refuses the request.
-    #[error("{reason}{hint} (coordinator {endpoint})")]
-    Refused {
-        /// Address of the coordinator.
-        endpoint: Endpoint,
-        /// The gRPC status code.
-        code: Code,
-        /// The coordinator's explanation.
-        reason: String,
-        /// Advice for the user, or an empty text.
-        hint: &'static str,
-    },
-    /// It is unknown whether the coordinator has accepted the job.
-    #[error(
-        "{cause}; the coordinator may have accepted the job: `osteon submit` of the same job with \
-         --request-id {request_id} prints its id and does not create a second job"
-    )]
-    Uncertain {
-        /// Error of the last attempt.
-        cause: Box<ClientError>,
-        /// Id of the request.
-        request_id: String,
-    },
-    /// Coordinator and client do not trust each other, possibly because credentials in the
-    /// environment were meant for another coordinator and therefore not used.
-    #[error("{cause}; {unused}")]
-    Untrusted {
-        /// The error.
-        cause: Box<ClientError>,
-        /// The environment variables that were not used.
-        unused: Unused,
-    },
-    /// The coordinator sent a message that cannot be read.
-    #[error("invalid answer of the coordinator at {endpoint}: {source}")]
-    Malformed {
-        /// Address of the coordinator.
-        endpoint: Endpoint,
-        /// The defect of the message.
-        source: Malformed,
-    },
-}
-
-impl ClientError {
-    /// Returns whether the cause is the user's input.
-    pub(crate) fn is_bad_input(&self) -> bool {
-        match self {
-            Self::Violations(_) | Self::Credentials(_) => true,
-            Self::Untrusted { cause, .. } => cause.is_bad_input(),
-            Self::Refused { code, .. } => {
-                matches!(code, Code::NotFound | Code::InvalidArgument | Code::AlreadyExists)
-            }
-            _ => false,
-        }
-    }
-
-    /// Adds the environment variables that were not used, if that may be the reason of the error.
-    fn with_unused_variables(self, unused: &Unused) -> Self {
-        let of_trust = matches!(
-            self,
-            Self::Credentials(CredentialsError::NoAuthority { .. })
-                | Self::Connect(ConnectError::Tls { .. })
-                | Self::Refused { code: Code::Unauthenticated, .. }
-        );
-        match of_trust && !unused.is_empty() {
-            true => Self::Untrusted { cause: Box::new(self), unused: unused.clone() },
-            false => self,
-        }
-    }
-}
-
-fn counted(violations: &Violations) -> String {
-    let lines: Vec<String> =
-        violations.iter().map(|violation| format!("\n  {violation}")).collect();
-    let errors = if lines.len() == 1 { "error" } else { "errors" };
-    format!("the coordinator rejected the job: {} {errors}{}", lines.len(), lines.concat())
-}
-
-/// Specification, result and history of an ended job.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Fetched {
-    /// The specification, with defaults filled in.
-    pub(crate) specification: JobSpecification,
-    /// The result, with the outcomes of the best point. For groups, it has the outcomes of each
-    /// group's best point, unless together they exceed the number that one evaluation may have.
-    pub(crate) result: JobResult,
-    /// The evaluations, in order.
-    pub(crate) history: Vec<Evaluation>,
-}
-
-/// Address of a coordinator and the credential files for it, which have not been read yet.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Remote {
-    /// Address of the coordinator.
-    pub(crate) endpoint: Endpoint,
-    /// The credential files.
-    pub(crate) files: CredentialFiles,
-    /// Whether the address comes from the environment and not from the command line.
-    pub(crate) from_environment: bool,
-    /// Environment variables that were not used for this coordinator.
-    pub(crate) unused: Unused,
-}
-
-impl Remote {
-    /// Prints the coordinator's address, unless it was given on the command line.
-    pub(crate) fn announce(&self) {
-        if self.from_environment {
-            say(&format!("running on {} ({COORDINATOR})", self.endpoint));
-        }
-    }
-}
-
 /// Properties of a submitted job besides its specification.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct SubmitOptions {
+pub struct SubmitOptions {
     /// Priority among the user's own jobs.
-    pub(crate) priority: u32,
+    pub priority: u32,
     /// Name for display; may be empty.
-    pub(crate) name: String,
+    pub name: String,
 }
 
 /// A connection to a coordinator.
 #[derive(Debug, Clone)]
-pub(crate) struct Client {
-    peer: Peer,
-    jobs: JobsClient<Connection>,
+pub struct Client {
+    pub(crate) peer: Peer,
+    pub(crate) jobs: JobsClient<Connection>,
 }
 
 impl Client {
     /// Reads the credentials and connects to the coordinator; waits if it is still starting.
-    pub(crate) async fn connect(remote: &Remote) -> Result<Self, ClientError> {
+    pub async fn connect(
+        remote: &Remote,
+        listener: Arc<dyn RunListener>,
+    ) -> Result<Self, ClientError> {
         let Remote { endpoint, files, unused, .. } = remote;
         let found = async {
             let credentials = loaded(files, endpoint).await?;
             let left = ANSWER_S_MAX - SILENCE_S_MAX;
             let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
-            with_wait_notice(Self::find(endpoint, &credentials), notice).await
+            with_wait_notice(Self::find(endpoint, &credentials), &*listener, notice).await
         };
         let jobs = found.await.map_err(|error: ClientError| error.with_unused_variables(unused))?;
-        Ok(Self { peer: Peer::new(remote), jobs })
+        Ok(Self { peer: Peer::new(remote, listener), jobs })
+    }
+
+    /// Returns who is told what the client waits for.
+    #[must_use]
+    pub fn listener(&self) -> &dyn RunListener {
+        &*self.peer.listener
     }
 
     /// Retries until there is a connection or the time limit has passed.
@@ -249,13 +106,13 @@ impl Client {
 
     /// Submits a job and returns its id. If a failure leaves unknown whether the coordinator has
     /// the job, the same request is sent again, within the client's time limit for an answer.
-    pub(crate) async fn submit(
+    pub async fn submit(
         &mut self,
         specification: &JobSpecification,
         request: &RequestId,
         options: SubmitOptions,
     ) -> Result<String, ClientError> {
-        let span = telemetry::recorder().and_then(|recorder| {
+        let span = self.peer.listener.spans().and_then(|recorder| {
             Some((recorder, OpenSpan::begin(SUBMIT, None, SystemTime::now())?))
         });
         let context = span.as_ref().map(|(_, span)| span.context());
@@ -310,12 +167,12 @@ impl Client {
     }
 
     /// Returns all jobs, oldest first.
-    pub(crate) async fn list(&mut self) -> Result<Vec<JobSnapshot>, ClientError> {
+    pub async fn list(&mut self) -> Result<Vec<JobSnapshot>, ClientError> {
         Ok(self.list_with_concerns().await?.0)
     }
 
     /// Returns all jobs, oldest first, and what the coordinator's operator should know.
-    pub(crate) async fn list_with_concerns(
+    pub async fn list_with_concerns(
         &mut self,
     ) -> Result<(Vec<JobSnapshot>, Vec<String>), ClientError> {
         let (mut jobs, mut concerns) = (Vec::new(), Vec::new());
@@ -334,13 +191,13 @@ impl Client {
     }
 
     /// Returns the workers that are banned because they computed wrongly.
-    pub(crate) async fn banned(&mut self) -> Result<Vec<v1::BannedWorker>, ClientError> {
+    pub async fn banned(&mut self) -> Result<Vec<v1::BannedWorker>, ClientError> {
         let call = self.jobs.list_bans(v1::ListBansRequest {});
         Ok(self.peer.answered(call).await?.workers)
     }
 
     /// Deletes ended jobs; returns the ids of the deleted ones.
-    pub(crate) async fn prune(
+    pub async fn prune(
         &mut self,
         older_than: Option<Duration>,
         keep_last: Option<u64>,
@@ -351,7 +208,7 @@ impl Client {
     }
 
     /// Cancels a job; returns its state afterwards.
-    pub(crate) async fn cancel(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
+    pub async fn cancel(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
         let call = self.jobs.cancel(v1::CancelRequest { job: job.to_owned() });
         let snapshot = self.peer.answered(call).await?.snapshot;
         self.present(snapshot, "snapshot")
@@ -359,7 +216,7 @@ impl Client {
 
     /// Follows a job until it has ended, and passes every snapshot to `show`. Reconnects to a
     /// coordinator that comes back within 10 s.
-    pub(crate) async fn watch<E: From<ClientError>>(
+    pub async fn watch<E: From<ClientError>>(
         &mut self,
         job: &str,
         mut show: impl FnMut(&JobSnapshot) -> Result<(), E>,
@@ -431,7 +288,7 @@ impl Client {
 
     /// Fetches the specification, result and history of an ended job. If the connection breaks meanwhile, it begins
     /// again, a few times.
-    pub(crate) async fn fetch(&mut self, job: &str) -> Result<Fetched, ClientError> {
+    pub async fn fetch(&mut self, job: &str) -> Result<Fetched, ClientError> {
         for _ in 1..FETCHES_MAX {
             match self.fetch_once(job).await {
                 Err(ClientError::Lost { .. }) => sleep(retry_pause()).await,
@@ -462,32 +319,35 @@ impl Client {
         parts.assemble().map_err(|source| self.malformed(source))
     }
 
-    fn present<T>(&self, field: Option<T>, name: &'static str) -> Result<T, ClientError> {
+    pub(crate) fn present<T>(
+        &self,
+        field: Option<T>,
+        name: &'static str,
+    ) -> Result<T, ClientError> {
         field.ok_or_else(|| self.malformed(Malformed::Missing { field: name }))
     }
 
-    fn malformed(&self, source: Malformed) -> ClientError {
+    pub(crate) fn malformed(&self, source: Malformed) -> ClientError {
         ClientError::Malformed { endpoint: self.peer.endpoint.clone(), source }
     }
 }
 
 /// Returns the final status of a job; `None` while it has not ended.
-pub(crate) fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
+pub fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
     JOB_STATUS.value(snapshot.status)
 }
 
 /// Reads the credential files on another thread, so that signals are handled while a pipe is read.
-async fn loaded(files: &CredentialFiles, endpoint: &Endpoint) -> Result<Credentials, ClientError> {
+pub(crate) async fn loaded(
+    files: &CredentialFiles,
+    endpoint: &Endpoint,
+) -> Result<Credentials, ClientError> {
     let (files, endpoint) = (files.clone(), endpoint.clone());
     match spawn_blocking(move || Credentials::load(&files, &endpoint)).await {
         Ok(loaded) => Ok(loaded?),
         // The task is never aborted, so it has panicked.
         Err(error) => resume_unwind(error.into_panic()),
     }
-}
-
-fn answer_limit() -> Duration {
-    Duration::from_secs(ANSWER_S_MAX)
 }
 
 fn retry_pause() -> Duration {

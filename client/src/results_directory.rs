@@ -18,26 +18,26 @@ use osteon_files::document::Format;
 use osteon_files::report::ResultFile;
 use osteon_files::{job_file, posterior_csv, results_csv, user_file};
 
-use crate::client::Fetched;
-use crate::exit_status::CommandFailure;
-use crate::progress::say;
+use crate::fetched::Fetched;
+use crate::listener::RunListener;
 use crate::request_id::RequestId;
 use crate::result_files::{self, RESULT, ResultFiles, ResultOrigin};
 use crate::result_status;
+use crate::run_error::RunError;
 
 /// File of the job to which a directory belongs.
-pub(crate) const JOB: &str = "job.toml";
+pub const JOB: &str = "job.toml";
 /// File of the case to which a directory belongs.
-pub(crate) const CASE: &str = "case.toml";
+pub const CASE: &str = "case.toml";
 /// A table of the results.
-pub(crate) const HISTORY: &str = "history.csv";
+pub const HISTORY: &str = "history.csv";
 /// A table of the results.
-pub(crate) const REALIZATIONS: &str = "realizations.csv";
+pub const REALIZATIONS: &str = "realizations.csv";
 /// A table of the results.
-pub(crate) const POSTERIOR: &str = "posterior.csv";
+pub const POSTERIOR: &str = "posterior.csv";
 const GROUPS: &str = "groups.csv";
 /// A table of the results.
-pub(crate) const COMPARISON: &str = "comparison.csv";
+pub const COMPARISON: &str = "comparison.csv";
 const LOCK: &str = ".lock";
 const REQUEST: &str = ".request";
 const STORE: &str = "store";
@@ -47,7 +47,7 @@ const LOCK_ATTEMPTS_MAX: u32 = 100;
 
 /// A directory of results, locked by this process.
 #[derive(Debug)]
-pub(crate) struct ResultsDirectory {
+pub struct ResultsDirectory {
     path: PathBuf,
     /// Held until the end, when its file is removed.
     _lock: File,
@@ -60,13 +60,13 @@ impl ResultsDirectory {
     /// # Errors
     /// Bad input if the directory belongs to another specification, or if the file is not a result
     /// of this one; failed if it cannot be read.
-    pub(crate) fn stored(
+    pub fn stored(
         path: &Path,
         specification: &JobSpecification,
-    ) -> Result<Option<ResultFile>, CommandFailure> {
+    ) -> Result<Option<ResultFile>, RunError> {
         let job = path.join(JOB);
         if path.exists() && !path.is_dir() {
-            return Err(CommandFailure::bad_input(anyhow!(
+            return Err(RunError::bad_input(anyhow!(
                 "{} is not a directory; choose another --out directory",
                 visible::path(path)
             )));
@@ -75,14 +75,14 @@ impl ResultsDirectory {
         match given(&job)? {
             Some(stored) => same_job(&job, &stored, specification)?,
             None if result.is_some() && !path.join(CASE).exists() => {
-                return Err(CommandFailure::bad_input(anyhow!(
+                return Err(RunError::bad_input(anyhow!(
                     "{} has a {RESULT} but no {JOB}: its job is unknown; \
                      choose another --out directory",
                     visible::path(path)
                 )));
             }
             None if path.join(CASE).exists() => {
-                return Err(CommandFailure::bad_input(anyhow!(
+                return Err(RunError::bad_input(anyhow!(
                     "{} holds the results of a simulation, not of a job; \
                      choose another --out directory",
                     visible::path(path)
@@ -91,9 +91,9 @@ impl ResultsDirectory {
             None => {}
         }
         let Some(text) = result else { return Ok(None) };
-        let result = read_result(path, &text).map_err(CommandFailure::BadInput)?;
+        let result = read_result(path, &text).map_err(RunError::BadInput)?;
         if result.kind() != specification.kind {
-            return Err(CommandFailure::bad_input(anyhow!(
+            return Err(RunError::bad_input(anyhow!(
                 "{} is the result of a {}, not of a {}; choose another --out directory",
                 result_path(path),
                 result.kind().name(),
@@ -108,10 +108,10 @@ impl ResultsDirectory {
     ///
     /// # Errors
     /// Same as [`stored`](Self::stored).
-    pub(crate) fn finished(
+    pub fn finished(
         path: &Path,
         specification: &JobSpecification,
-    ) -> Result<Option<ResultFile>, CommandFailure> {
+    ) -> Result<Option<ResultFile>, RunError> {
         Ok(Self::stored(path, specification)?
             .filter(|result| !result_status::is_worth_repeating(result)))
     }
@@ -121,12 +121,12 @@ impl ResultsDirectory {
     ///
     /// # Errors
     /// If another process holds the lock, or if the directory cannot be written.
-    pub(crate) fn open(path: &Path) -> Result<Self, CommandFailure> {
+    pub fn open(path: &Path) -> Result<Self, RunError> {
         make_directory(path)?;
         let lock_path = path.join(LOCK);
         for _ in 0..LOCK_ATTEMPTS_MAX {
             let lock = user_file::create(&lock_path).map_err(|error| {
-                CommandFailure::unusable_path(
+                RunError::unusable_path(
                     error,
                     format!("cannot write {}", visible::path(&lock_path)),
                 )
@@ -138,22 +138,22 @@ impl ResultsDirectory {
                 Err(TryLockError::WouldBlock) => break,
                 Err(TryLockError::Error(error)) => {
                     let context = format!("cannot lock {}", visible::path(&lock_path));
-                    return Err(CommandFailure::failed(anyhow::Error::new(error).context(context)));
+                    return Err(RunError::failed(anyhow::Error::new(error).context(context)));
                 }
             }
         }
-        Err(CommandFailure::failed(anyhow!("another osteon is running in {}", visible::path(path))))
+        Err(RunError::failed(anyhow!("another osteon is running in {}", visible::path(path))))
     }
 
     /// Returns the directory of the run's store, which is kept until the run has ended.
-    pub(crate) fn store(&self) -> PathBuf {
+    pub fn store(&self) -> PathBuf {
         self.path.join(STORE)
     }
 
     /// Returns the request of this directory, which is the same at every call and on every host.
-    pub(crate) fn request(&self) -> Result<RequestId, CommandFailure> {
+    pub fn request(&self) -> Result<RequestId, RunError> {
         let path = self.path.join(REQUEST);
-        let stored = read_if_there(&path).map_err(CommandFailure::Failed)?.unwrap_or_default();
+        let stored = read_if_there(&path).map_err(RunError::Failed)?.unwrap_or_default();
         let mut lines = stored.lines().map(str::trim);
         if let Some(id) = lines.next().filter(|id| !id.is_empty()) {
             let request = RequestId::with_id(id.to_owned());
@@ -161,31 +161,33 @@ impl ResultsDirectory {
             let client = lines.next().map_or(request.client, str::to_owned);
             return Ok(RequestId { client, ..request });
         }
-        let request = RequestId::new().map_err(CommandFailure::failed)?;
+        let request = RequestId::new().map_err(RunError::failed)?;
         let text = format!("{}\n{}\n", request.id, request.client);
-        result_files::write(&path, &text).map_err(CommandFailure::Failed)?;
+        result_files::write(&path, &text).map_err(RunError::Failed)?;
         Ok(request)
     }
 
     /// Makes the next [`request`](Self::request) a new one, because the job of the present one
     /// cannot be continued.
-    pub(crate) fn forget_request(&self) {
+    pub fn forget_request(&self) {
         // If removal fails, the only harm is that the same ending is shown again.
         drop(fs::remove_file(self.path.join(REQUEST)));
     }
 
     /// Writes `job.toml`: from now on the directory belongs to this specification.
-    pub(crate) fn write_job(&self, specification: &JobSpecification) -> Result<(), CommandFailure> {
+    pub fn write_job(&self, specification: &JobSpecification) -> Result<(), RunError> {
         let text = job_file::to_toml(specification);
-        result_files::write(&self.path.join(JOB), &text).map_err(CommandFailure::Failed)
+        result_files::write(&self.path.join(JOB), &text).map_err(RunError::Failed)
     }
 
-    /// Writes all files of an ended job, `result.json` last, and returns the result.
-    pub(crate) fn write_results(
+    /// Writes all files of an ended job, `result.json` last, and returns the result. The listener learns what
+    /// was left out.
+    pub fn write_results(
         &self,
         kind: JobKind,
         fetched: &Fetched,
-    ) -> Result<ResultFile, CommandFailure> {
+        listener: &dyn RunListener,
+    ) -> Result<ResultFile, RunError> {
         let written = ResultFile::from_job(kind, &fetched.result);
         let write_all = || -> anyhow::Result<()> {
             let mut files = ResultFiles::begin(&self.path)?;
@@ -200,7 +202,7 @@ impl ResultsDirectory {
                 files.write(GROUPS, &groups)?;
                 files.write(COMPARISON, &results_csv::comparison(result))?;
             }
-            files.write(REALIZATIONS, &realizations(fetched))?;
+            files.write(REALIZATIONS, &realizations(fetched, listener))?;
             if fetched.specification.posterior.is_some() {
                 let Fetched { specification, result, .. } = fetched;
                 files.write(POSTERIOR, &posterior_csv::posterior(specification, result))?;
@@ -218,7 +220,7 @@ impl ResultsDirectory {
                 },
             )
         };
-        write_all().map_err(CommandFailure::Failed)?;
+        write_all().map_err(RunError::Failed)?;
         if fetched.result.status != Status::Cancelled {
             // The data for resuming are no longer needed; it does no harm if some remain.
             self.forget_request();
@@ -239,18 +241,18 @@ impl Drop for ResultsDirectory {
 ///
 /// # Errors
 /// Bad input if the path cannot be a directory, failed if the machine has no room for it.
-pub(crate) fn make_directory(path: &Path) -> Result<(), CommandFailure> {
+pub fn make_directory(path: &Path) -> Result<(), RunError> {
     // A link to nothing is there for the system, and nowhere for the user.
     if let Ok(target) = fs::read_link(path)
         && !path.exists()
     {
         let (shown, target) = (visible::path(path), visible::path(&target));
-        return Err(CommandFailure::bad_input(anyhow::anyhow!(
+        return Err(RunError::bad_input(anyhow::anyhow!(
             "{shown} is a link to {target}, which does not exist; create that directory, or remove the link"
         )));
     }
     fs::create_dir_all(path).map_err(|error| {
-        CommandFailure::unusable_path(
+        RunError::unusable_path(
             error,
             format!("cannot create the directory {}", visible::path(path)),
         )
@@ -258,24 +260,22 @@ pub(crate) fn make_directory(path: &Path) -> Result<(), CommandFailure> {
 }
 
 /// Returns the text of a file in a directory named by the user; `None` if there is no such file.
-pub(crate) fn given(path: &Path) -> Result<Option<String>, CommandFailure> {
+pub fn given(path: &Path) -> Result<Option<String>, RunError> {
     read_if_there(path).map_err(|error| match error.downcast::<std::io::Error>() {
-        Ok(error) => {
-            CommandFailure::unusable_path(error, format!("cannot read {}", visible::path(path)))
-        }
-        Err(error) => CommandFailure::Failed(error),
+        Ok(error) => RunError::unusable_path(error, format!("cannot read {}", visible::path(path))),
+        Err(error) => RunError::Failed(error),
     })
 }
 
 /// Returns the table of the realizations at the best point, or at those of the groups.
-fn realizations(fetched: &Fetched) -> String {
+fn realizations(fetched: &Fetched, listener: &dyn RunListener) -> String {
     if fetched.specification.data.as_ref().is_some_and(Data::is_grouped) {
         let groups = fetched.result.groups.iter();
         let left_out =
             |group: &&GroupResult| group.best.as_ref().is_some_and(|best| best.outcomes.is_empty());
         let left_out = groups.filter(left_out).count();
         if left_out > 0 {
-            say(&format!(
+            listener.note(&format!(
                 "{REALIZATIONS} is without those of the last {left_out} groups: it has at most \
                  {REALIZATIONS_MAX} rows"
             ));
@@ -298,16 +298,12 @@ fn is_at(file: &File, path: &Path) -> bool {
 ///
 /// # Errors
 /// If there is none, or if it cannot be read.
-pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpecification> {
+pub fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpecification> {
     Ok(job_file::read(&directory.join(JOB), kind)?)
 }
 
 /// Refuses a directory whose job is not `specification`, and reports the first difference.
-fn same_job(
-    path: &Path,
-    stored: &str,
-    specification: &JobSpecification,
-) -> Result<(), CommandFailure> {
+fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), RunError> {
     // The comparison ignores formatting, and defaults that are left out.
     let directory = path.parent().unwrap_or(Path::new(""));
     // Only the job of an identification has data.
@@ -317,7 +313,7 @@ fn same_job(
         .map_or_else(|| stored.to_owned(), |there| job_file::to_toml(&there));
     match difference(&complete, &job_file::to_toml(specification)) {
         None => Ok(()),
-        Some(difference) => Err(CommandFailure::bad_input(anyhow!(
+        Some(difference) => Err(RunError::bad_input(anyhow!(
             "{} belongs to a different specification ({difference}); \
              choose another --out directory",
             visible::path(path)
@@ -326,7 +322,7 @@ fn same_job(
 }
 
 /// Describes the first line in which the complete texts of two jobs differ.
-pub(crate) fn difference(there: &str, here: &str) -> Option<String> {
+pub fn difference(there: &str, here: &str) -> Option<String> {
     if there == here {
         return None;
     }
@@ -343,14 +339,14 @@ pub(crate) fn difference(there: &str, here: &str) -> Option<String> {
 ///
 /// # Errors
 /// If there is none, or if it cannot be read.
-pub(crate) fn result_of(directory: &Path) -> anyhow::Result<ResultFile> {
+pub fn result_of(directory: &Path) -> anyhow::Result<ResultFile> {
     let text = read_if_there(&directory.join(RESULT))?;
     let cannot = || format!("cannot read {}: no such file", result_path(directory));
     read_result(directory, &text.with_context(cannot)?)
 }
 
 /// Returns the path of the result in `directory`, for messages.
-pub(crate) fn result_path(directory: &Path) -> String {
+pub fn result_path(directory: &Path) -> String {
     visible::path(&directory.join(RESULT))
 }
 

@@ -5,6 +5,7 @@ use osteon_common::settings::{Picking, SolverSettings};
 use osteon_common::version::Program;
 
 use super::*;
+use crate::listener::Silent;
 use crate::sample_result::drawn_posterior;
 
 pub(crate) fn specification() -> JobSpecification {
@@ -59,7 +60,8 @@ fn only_a_run_that_ended_by_itself_is_finished_and_needs_no_store() {
         let directory = ResultsDirectory::open(&path).unwrap();
         let request = directory.request().unwrap();
         fs::create_dir(directory.store()).unwrap();
-        let written = directory.write_results(JobKind::Identification, &fetched(status)).unwrap();
+        let written =
+            directory.write_results(JobKind::Identification, &fetched(status), &Silent).unwrap();
 
         let ended = status != Status::Cancelled;
         let finished = ResultsDirectory::finished(&path, &specification()).unwrap();
@@ -78,8 +80,9 @@ fn a_directory_belongs_to_one_specification() {
     let scratch = tempfile::tempdir().unwrap();
     let directory = ResultsDirectory::open(scratch.path()).unwrap();
     let specification = specification();
-    let written =
-        directory.write_results(JobKind::Identification, &fetched(Status::Converged)).unwrap();
+    let written = directory
+        .write_results(JobKind::Identification, &fetched(Status::Converged), &Silent)
+        .unwrap();
     let stored = |specification| ResultsDirectory::stored(scratch.path(), specification);
     assert_eq!(stored(&specification).unwrap(), Some(written));
     let mut other = specification.clone();
@@ -92,13 +95,13 @@ fn a_directory_belongs_to_one_specification() {
 fn a_damaged_result_is_refused_with_the_key_and_what_to_do() {
     let scratch = tempfile::tempdir().unwrap();
     let directory = ResultsDirectory::open(scratch.path()).unwrap();
-    directory.write_results(JobKind::Identification, &fetched(Status::Converged)).unwrap();
+    directory.write_results(JobKind::Identification, &fetched(Status::Converged), &Silent).unwrap();
     let path = scratch.path().join(RESULT);
     let text = fs::read_to_string(&path).unwrap();
     let refused = |text: String| {
         fs::write(&path, text).unwrap();
         let failure = ResultsDirectory::stored(scratch.path(), &specification()).unwrap_err();
-        assert_eq!(failure.exit_code(), 2);
+        assert!(matches!(failure, RunError::BadInput(_)));
         failure.to_string()
     };
     let refusal = refused(text.replace("\"seed\": 1", "\"seed\": -1"));
@@ -120,7 +123,7 @@ fn the_draws_have_a_file_if_the_job_asks_for_them() {
         let directory = ResultsDirectory::open(scratch.path()).unwrap();
         let mut fetched = fetched(Status::Converged);
         change(&mut fetched);
-        directory.write_results(JobKind::Identification, &fetched).unwrap();
+        directory.write_results(JobKind::Identification, &fetched, &Silent).unwrap();
         let provenance = fs::read_to_string(scratch.path().join("provenance.json")).unwrap();
         let text = fs::read_to_string(scratch.path().join(POSTERIOR)).ok();
         assert_eq!(provenance.contains(POSTERIOR), text.is_some(), "{provenance}");
@@ -147,7 +150,7 @@ fn a_directory_is_held_until_everything_is_written() {
         assert!(failure.to_string().contains("another osteon is running"), "{what}: {failure}");
     };
     refused("opened");
-    directory.write_results(JobKind::Identification, &fetched(Status::Converged)).unwrap();
+    directory.write_results(JobKind::Identification, &fetched(Status::Converged), &Silent).unwrap();
     refused("written");
     drop(directory);
     assert!(!scratch.path().join(LOCK).exists());
@@ -175,7 +178,7 @@ fn a_run_that_failed_because_of_its_machines_is_run_again_from_nothing() {
     let mut failed = fetched(Status::Failed);
     failed.result.failure = Some(JobFailure::IntegrityError);
     failed.result.reason = Some("integrity error: realization 3 is …".to_owned());
-    directory.write_results(JobKind::Identification, &failed).unwrap();
+    directory.write_results(JobKind::Identification, &failed, &Silent).unwrap();
     assert_eq!(ResultsDirectory::finished(&path, &specification()).unwrap(), None);
     assert!(!directory.store().exists());
     assert_ne!(directory.request().unwrap(), request);

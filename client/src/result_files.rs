@@ -13,33 +13,33 @@ use osteon_files::user_file;
 use serde_json::{Value, json};
 
 /// The result file, written last: a directory that contains it is complete.
-pub(crate) const RESULT: &str = "result.json";
+pub const RESULT: &str = "result.json";
 /// The file that records the origin of the other files.
-pub(crate) const PROVENANCE: &str = "provenance.json";
+pub const PROVENANCE: &str = "provenance.json";
 
 /// Origin of the files of a directory.
-pub(crate) struct ResultOrigin<'a> {
+pub struct ResultOrigin<'a> {
     /// Kind of the computation: `kind` of the result.
-    pub(crate) kind: &'a str,
+    pub kind: &'a str,
     /// The program that computed the result.
-    pub(crate) program: &'a Program,
+    pub program: &'a Program,
     /// Digest of the result, if it has one.
-    pub(crate) digest: Option<&'a str>,
+    pub digest: Option<&'a str>,
     /// Seed of the germs, if any were drawn.
-    pub(crate) seed: Option<u64>,
+    pub seed: Option<u64>,
     /// Set if a host that computed a part of the result was banned after the job had ended.
-    pub(crate) integrity: Option<&'a IntegrityReport>,
+    pub integrity: Option<&'a IntegrityReport>,
 }
 
 /// Writer of the files of a directory, one after another.
-pub(crate) struct ResultFiles<'a> {
+pub struct ResultFiles<'a> {
     directory: &'a Path,
     written: Vec<Value>,
 }
 
 impl<'a> ResultFiles<'a> {
     /// Removes an old result: the directory is incomplete until [`finish`](Self::finish).
-    pub(crate) fn begin(directory: &'a Path) -> anyhow::Result<Self> {
+    pub fn begin(directory: &'a Path) -> anyhow::Result<Self> {
         for name in [RESULT, PROVENANCE] {
             remove_if_there(&directory.join(name))?;
         }
@@ -47,12 +47,12 @@ impl<'a> ResultFiles<'a> {
     }
 
     /// Writes a file.
-    pub(crate) fn write(&mut self, name: &str, text: &str) -> anyhow::Result<()> {
+    pub fn write(&mut self, name: &str, text: &str) -> anyhow::Result<()> {
         self.write_by(name, |file| file.write_all(text.as_bytes()))
     }
 
     /// Same as [`write`](Self::write), for a text that `print` writes piece by piece.
-    pub(crate) fn write_by(
+    pub fn write_by(
         &mut self,
         name: &str,
         print: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -64,7 +64,7 @@ impl<'a> ResultFiles<'a> {
     }
 
     /// Writes `provenance.json`, then the result.
-    pub(crate) fn finish(mut self, result: &str, origin: &ResultOrigin<'_>) -> anyhow::Result<()> {
+    pub fn finish(mut self, result: &str, origin: &ResultOrigin<'_>) -> anyhow::Result<()> {
         let mut hash = blake3::Hasher::new();
         hash.update(result.as_bytes());
         self.note(RESULT, &hash);
@@ -116,7 +116,7 @@ impl Write for Hashing<'_> {
 
 /// Writes `text` to `path` atomically: a reader sees either the previous content or all of the new
 /// one.
-pub(crate) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+pub fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     write_by(path, |file| file.write_all(text.as_bytes()))
 }
 
@@ -137,7 +137,7 @@ fn write_by(
 }
 
 /// Removes a file, if it is there.
-pub(crate) fn remove_if_there(path: &Path) -> anyhow::Result<()> {
+pub fn remove_if_there(path: &Path) -> anyhow::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => {
             Err(error).with_context(|| format!("cannot replace {}", visible::path(path)))

@@ -11,11 +11,11 @@ use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::{self, DrawBlock, RealizationBlock};
 use osteon_proto::{posterior, realizations, results, specification};
 
-use super::Fetched;
+use crate::fetched::Fetched;
 
 /// The parts received so far.
 #[derive(Debug, Default)]
-pub(super) struct FetchedParts {
+pub(crate) struct FetchedParts {
     specification: Option<v1::JobSpecification>,
     result: Option<v1::JobResult>,
     history: Vec<Evaluation>,
@@ -49,7 +49,7 @@ struct PointOutcomes {
 
 impl FetchedParts {
     /// Adds the next part.
-    pub(super) fn add(&mut self, part: Part) -> Result<(), Malformed> {
+    pub(crate) fn add(&mut self, part: Part) -> Result<(), Malformed> {
         match part {
             Part::Specification(specification) => self.specification = Some(specification),
             Part::Result(result) => self.result = Some(result),
@@ -122,7 +122,7 @@ impl FetchedParts {
     }
 
     /// Assembles the parts once all have arrived.
-    pub(super) fn assemble(self) -> Result<Fetched, Malformed> {
+    pub(crate) fn assemble(self) -> Result<Fetched, Malformed> {
         let specification =
             self.specification.ok_or(Malformed::Missing { field: "specification" })?;
         let result = self.result.ok_or(Malformed::Missing { field: "result" })?;

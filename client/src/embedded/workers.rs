@@ -17,9 +17,11 @@ use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
 
 use crate::environment;
-use crate::exit_status::{BAD_MACHINE, CommandFailure};
-use crate::progress::say;
+use crate::listener::RunListener;
+use crate::run_error::RunError;
 
+/// Exit code of a worker whose machine computes wrongly.
+pub const BAD_MACHINE: u8 = 77;
 /// Time after which a worker ends by itself if it has lost this process, s.
 const GIVE_UP_AFTER_S: u64 = 5;
 /// Maximum number of consecutive deaths of one worker without progress of the run in between.
@@ -35,7 +37,7 @@ const LINE_BYTES_MAX: u64 = 4096;
 const STDERR_DRAIN_MS: u64 = 500;
 
 /// The worker processes; dropping this ends all of them.
-pub(crate) struct Workers {
+pub(super) struct Workers {
     tasks: JoinSet<()>,
     stop: watch::Sender<bool>,
     failures: mpsc::Receiver<anyhow::Error>,
@@ -50,6 +52,7 @@ struct SupervisorState {
     threads: u32,
     progress: Arc<AtomicU64>,
     muted: Arc<AtomicBool>,
+    listener: Arc<dyn RunListener>,
 }
 
 /// Deaths of one worker since the last progress.
@@ -70,17 +73,18 @@ impl Deaths {
 
 impl Workers {
     /// Starts `count` worker processes of `executable`, with `threads` threads each.
-    pub(crate) fn start(
+    pub(super) fn start(
         executable: PathBuf,
         endpoint: &Endpoint,
-        count: u32,
-        threads: u32,
+        (count, threads): (u32, u32),
         progress: Arc<AtomicU64>,
+        listener: Arc<dyn RunListener>,
     ) -> Self {
         let endpoint = endpoint.clone();
         let muted = Arc::<AtomicBool>::default();
+        let muted_too = Arc::clone(&muted);
         let shared =
-            SupervisorState { executable, endpoint, threads, progress, muted: Arc::clone(&muted) };
+            SupervisorState { executable, endpoint, threads, progress, muted: muted_too, listener };
         let shared = Arc::new(shared);
         let (stop, stopped) = watch::channel(false);
         let (failure_sender, failures) = mpsc::channel(1);
@@ -92,20 +96,20 @@ impl Workers {
     }
 
     /// Completes when a worker has failed for good.
-    pub(crate) async fn failed(&mut self) -> CommandFailure {
+    pub(super) async fn failed(&mut self) -> RunError {
         match self.failures.recv().await {
-            Some(error) => CommandFailure::Failed(error),
-            None => CommandFailure::failed(anyhow!("all workers have ended")),
+            Some(error) => RunError::Failed(error),
+            None => RunError::failed(anyhow!("all workers have ended")),
         }
     }
 
     /// Reports nothing of the workers from now on: that they lose their coordinator is intended.
-    pub(crate) fn mute(&self) {
+    pub(super) fn mute(&self) {
         self.muted.store(true, Ordering::Relaxed);
     }
 
     /// Ends and reaps all processes.
-    pub(crate) async fn end(mut self) {
+    pub(super) async fn end(mut self) {
         // Fails only if every task has already ended.
         let _ended = self.stop.send(true);
         while self.tasks.join_next().await.is_some() {}
@@ -124,8 +128,7 @@ async fn keep(
         let mut is_bad_machine = false;
         let (death, words) = match spawn(&shared.executable, &shared.endpoint, shared.threads) {
             Ok(mut child) => {
-                let words =
-                    tokio::spawn(listen(number, child.stderr.take(), Arc::clone(&shared.muted)));
+                let words = tokio::spawn(listen(number, child.stderr.take(), Arc::clone(&shared)));
                 tokio::select! {
                     status = child.wait() => {
                         let code = status.as_ref().ok().and_then(ExitStatus::code);
@@ -158,7 +161,7 @@ async fn keep(
             drop(failures.try_send(error));
             return;
         }
-        say(&format!("worker {number} {death}; starting another"));
+        shared.listener.note(&format!("worker {number} {death}; starting another"));
         let wait = Duration::from_millis(RESPAWN_MS * u64::from(in_a_row));
         tokio::select! {
             () = sleep(wait) => {}
@@ -195,7 +198,7 @@ fn spawn(executable: &Path, endpoint: &Endpoint, threads: u32) -> anyhow::Result
 async fn listen(
     number: u32,
     stderr: Option<impl AsyncRead + Unpin>,
-    muted: Arc<AtomicBool>,
+    shared: Arc<SupervisorState>,
 ) -> VecDeque<String> {
     let mut lines = VecDeque::new();
     let Some(stderr) = stderr else { return lines };
@@ -208,8 +211,8 @@ async fn listen(
             Ok(_) => {}
         }
         let line = String::from_utf8_lossy(&bytes).trim_end().to_owned();
-        if !muted.load(Ordering::Relaxed) {
-            say(&format!("worker {number}: {line}"));
+        if !shared.muted.load(Ordering::Relaxed) {
+            shared.listener.note(&format!("worker {number}: {line}"));
         }
         if lines.len() == LINES_KEPT_MAX {
             lines.pop_front();
@@ -235,6 +238,18 @@ fn describe_death(status: std::io::Result<ExitStatus>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::listener::Silent;
+
+    fn shared() -> Arc<SupervisorState> {
+        Arc::new(SupervisorState {
+            executable: PathBuf::new(),
+            endpoint: "unix:/nonexistent".parse().unwrap(),
+            threads: 1,
+            progress: Arc::default(),
+            muted: Arc::default(),
+            listener: Arc::new(Silent),
+        })
+    }
 
     #[test]
     fn progress_forgives_deaths() {
@@ -246,11 +261,11 @@ mod tests {
     #[tokio::test]
     async fn the_last_lines_are_kept() {
         let text: String = (0..100).map(|i| format!("line {i}\n")).collect();
-        let lines = listen(1, Some(text.as_bytes()), Arc::default()).await;
+        let lines = listen(1, Some(text.as_bytes()), shared()).await;
         assert_eq!(lines.len(), LINES_KEPT_MAX);
         assert_eq!(lines.back().map(String::as_str), Some("line 99"));
         let endless = vec![b'x'; 3 * 4096];
-        let lines = listen(1, Some(endless.as_slice()), Arc::default()).await;
+        let lines = listen(1, Some(endless.as_slice()), shared()).await;
         assert_eq!(lines.len(), 3);
     }
 
@@ -259,7 +274,8 @@ mod tests {
         let endpoint: Endpoint = "unix:/nonexistent".parse().unwrap();
         // A program that rejects the options of a worker with a message, and ends.
         let executable = PathBuf::from("cat");
-        let mut workers = Workers::start(executable, &endpoint, 2, 1, Arc::default());
+        let mut workers =
+            Workers::start(executable, &endpoint, (2, 1), Arc::default(), Arc::new(Silent));
         let failure = workers.failed().await.to_string();
         workers.end().await;
         assert!(failure.contains("exited 10 times in a row"), "{failure}");
@@ -282,7 +298,8 @@ mod tests {
         std::fs::write(&script, text).unwrap();
         std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o700)).unwrap();
         let endpoint: Endpoint = "unix:/nonexistent".parse().unwrap();
-        let mut workers = Workers::start(script, &endpoint, 12, 1, Arc::default());
+        let mut workers =
+            Workers::start(script, &endpoint, (12, 1), Arc::default(), Arc::new(Silent));
         let started = async {
             while count() < 20 {
                 sleep(Duration::from_millis(10)).await;
@@ -301,7 +318,8 @@ mod tests {
     async fn a_program_that_cannot_be_started_is_named() {
         let endpoint: Endpoint = "unix:/nonexistent".parse().unwrap();
         let executable = PathBuf::from("/nonexistent/osteon");
-        let mut workers = Workers::start(executable, &endpoint, 1, 1, Arc::default());
+        let mut workers =
+            Workers::start(executable, &endpoint, (1, 1), Arc::default(), Arc::new(Silent));
         let failure = workers.failed().await.to_string();
         assert!(failure.contains("/nonexistent/osteon"), "{failure}");
     }
