@@ -26,6 +26,7 @@ pub(crate) mod job;
 pub(crate) mod job_pages;
 pub(crate) mod measurements;
 pub mod notice;
+pub mod policy;
 pub(crate) mod probation;
 pub mod proofs;
 pub(crate) mod rate;

@@ -5,10 +5,7 @@
 
 use std::time::Duration;
 
-/// Weight of the newest answer.
-const WEIGHT: f64 = 1.0 / 16.0;
-/// Longest delay that counts, s: a single answer may be later for a reason of its own.
-const LONGEST_S: f64 = 2.0;
+use crate::core::policy::{DELAY_MAX_S, DELAY_WEIGHT};
 
 /// Mean delay of the answers that came last.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -20,8 +17,8 @@ impl AnswerDelay {
     pub(crate) fn learn(&mut self, waited_s: f64, computed_s: f64) {
         let delay = waited_s - computed_s;
         // What is not a number counts as no delay.
-        let delay = if delay > 0.0 { delay.min(LONGEST_S) } else { 0.0 };
-        self.0 += WEIGHT * (delay - self.0);
+        let delay = if delay > 0.0 { delay.min(DELAY_MAX_S) } else { 0.0 };
+        self.0 += DELAY_WEIGHT * (delay - self.0);
     }
 
     /// Returns the mean delay.
@@ -45,7 +42,7 @@ mod tests {
         for odd in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             delay.learn(odd, odd);
             delay.learn(odd, 0.0);
-            assert!(delay.mean().as_secs_f64() <= LONGEST_S, "{odd}");
+            assert!(delay.mean().as_secs_f64() <= DELAY_MAX_S, "{odd}");
         }
     }
 }

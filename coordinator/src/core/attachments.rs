@@ -6,11 +6,7 @@ use std::time::Duration;
 
 use osteon_common::limits::WORKERS_MAX;
 
-/// Number of attachments of a host in quick succession: as many processes as a large machine has cores may
-/// start at the same moment, and once more after a restart of the coordinator.
-const BURST: f64 = 512.0;
-/// Number of further attachments per second.
-const PER_SECOND: f64 = 8.0;
+use crate::core::policy::{ATTACHMENT_BURST, ATTACHMENTS_PER_SECOND};
 
 /// What the hosts that attached in the last minute are still allowed, by host.
 #[derive(Debug, Default)]
@@ -27,8 +23,8 @@ struct Allowance {
 impl Allowance {
     /// Returns how many times the host may attach at `now`.
     fn attachments_at(self, now: Duration) -> f64 {
-        let regained = PER_SECOND * now.saturating_sub(self.at).as_secs_f64();
-        (self.attachments + regained).min(BURST)
+        let regained = ATTACHMENTS_PER_SECOND * now.saturating_sub(self.at).as_secs_f64();
+        (self.attachments + regained).min(ATTACHMENT_BURST)
     }
 }
 
@@ -36,12 +32,13 @@ impl Attachments {
     /// Counts an attachment of a host; returns whether it is one too many.
     pub(crate) fn exceed(&mut self, host: &str, now: Duration) -> bool {
         if self.0.len() >= WORKERS_MAX && !self.0.contains_key(host) {
-            self.0.retain(|_, allowance| allowance.attachments_at(now) < BURST);
+            self.0.retain(|_, allowance| allowance.attachments_at(now) < ATTACHMENT_BURST);
             if self.0.len() >= WORKERS_MAX {
                 self.0.pop_first();
             }
         }
-        let allowed = self.0.get(host).map_or(BURST, |allowance| allowance.attachments_at(now));
+        let allowed =
+            self.0.get(host).map_or(ATTACHMENT_BURST, |allowance| allowance.attachments_at(now));
         let exceeds = allowed < 1.0;
         let attachments = if exceeds { allowed } else { allowed - 1.0 };
         self.0.insert(host.to_owned(), Allowance { attachments, at: now });

@@ -11,10 +11,6 @@ use osteon_common::outcome::{RealizationResult, encode};
 use crate::core::indices::Indices;
 use crate::core::worker_name::WorkerName;
 
-/// Maximum number of hosts that are asked for their votes. More than half of so many agree on a wrong
-/// answer only if many machines are broken in the same way.
-pub(crate) const VOTERS_MAX: usize = 9;
-
 /// Vote of one host.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vote {

@@ -9,12 +9,8 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use crate::core::policy::{CRASHES_MAX, LOSSES_MAX};
 use crate::core::worker_name::WorkerName;
-
-/// Number of crashes of workers that had answered something before that makes a task poison.
-const CRASH_LIMIT: usize = 3;
-/// Upper limit for lost workers of any kind, so that retries end.
-const LOSS_LIMIT: usize = 10;
 
 /// Reason why the stay of a worker ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,7 +108,7 @@ impl Crashes {
 
     /// Returns whether one more loss is the last for which the task is tried.
     pub(crate) fn permit_only_one_more(&self) -> bool {
-        self.0.len() + 1 >= LOSS_LIMIT
+        self.0.len() + 1 >= LOSSES_MAX
     }
 
     /// Returns whether enough workers were lost that the task is poison. `untried` returns whether
@@ -121,8 +117,8 @@ impl Crashes {
     pub(crate) fn reach_limit(&self, untried: impl FnOnce() -> bool) -> bool {
         let credible = || self.0.iter().filter(|loss| loss.is_credible());
         let hosts: BTreeSet<&str> = credible().map(|loss| loss.worker.host()).collect();
-        self.0.len() >= LOSS_LIMIT
-            || (credible().count() >= CRASH_LIMIT && (hosts.len() >= CRASH_LIMIT || !untried()))
+        self.0.len() >= LOSSES_MAX
+            || (credible().count() >= CRASHES_MAX && (hosts.len() >= CRASHES_MAX || !untried()))
     }
 }
 

@@ -7,8 +7,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Upper limit for the charge of a batch, whatever the worker reports.
-const CHARGE_MAX: Duration = Duration::from_secs(86_400);
+use crate::core::policy::CHARGE_MAX;
 
 /// Computing time received by each client with a job under way.
 #[derive(Debug, Default)]

@@ -7,16 +7,11 @@ use osteon_common::job::JobKind;
 use osteon_proto::v1::WorkerState;
 
 use crate::core::job::{Job, Stage};
+use crate::core::policy::{BATCH_WORTH_S, REALIZATION_USUAL_S};
 use crate::core::reactor::realizations_held;
 use crate::core::service_condition::Bounded;
 use crate::core::state::{AttachedWorker, State};
 use crate::core::worker_list;
-
-/// A slot is worth having for a job if it is busy for this long in each evaluation, s. Batches that
-/// take less cost more than they bring.
-const WORTH_S: f64 = 0.02;
-/// Time of a realization, s, that is assumed before the first answer of a job.
-const USUAL_S: f64 = 1e-3;
 
 /// A state at one moment, in numbers.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -128,8 +123,8 @@ fn slots_wanted(job: &Job) -> u64 {
         (Stage::Computing(evaluation), JobKind::Propagation) => all - evaluation.filled().min(all),
         _ => all.saturating_mul(job.search.parts().saturating_sub(job.search.part())),
     };
-    let each = job.pace.expected(1, 1).map_or(USUAL_S, |time| time.as_secs_f64());
-    let worth = (realizations as f64 * each / WORTH_S).ceil();
+    let each = job.pace.expected(1, 1).map_or(REALIZATION_USUAL_S, |time| time.as_secs_f64());
+    let worth = (realizations as f64 * each / BATCH_WORTH_S).ceil();
     // `as` saturates.
     (worth as u64).clamp(realizations.min(1), realizations)
 }

@@ -9,16 +9,8 @@ use std::time::Duration;
 
 use osteon_common::limits::WORKERS_MAX;
 
+use crate::core::policy::{PROBATION_MEMORY, PROBATION_PAUSE_MAX, PROBATION_PAUSE_MIN};
 use crate::core::worker_name::WorkerName;
-
-/// Pause without work after the first batch that a worker on probation leaves unanswered; each
-/// further one doubles it.
-const REST_MIN: Duration = Duration::from_secs(3);
-/// Upper limit of that pause. Every trial may delay an evaluation by some seconds, but a worker
-/// that has recovered should not stay idle for long.
-const REST_MAX: Duration = Duration::from_secs(60);
-/// Time after which a worker is forgotten if it has missed nothing more.
-const MEMORY: Duration = Duration::from_secs(600);
 
 /// The workers that are on probation.
 #[derive(Debug, Clone, Default)]
@@ -62,9 +54,9 @@ impl Probation {
             rests_until: now,
             last: now,
         });
-        let rest = REST_MIN * 2_u32.saturating_pow(trial.missed.min(31));
+        let rest = PROBATION_PAUSE_MIN * 2_u32.saturating_pow(trial.missed.min(31));
         trial.missed = trial.missed.saturating_add(1);
-        trial.rests_until = now + rest.min(REST_MAX);
+        trial.rests_until = now + rest.min(PROBATION_PAUSE_MAX);
         trial.last = now;
         begins
     }
@@ -95,7 +87,7 @@ impl Probation {
     /// Forgets workers that have given no reason for a long time, and returns whether there were any.
     pub(crate) fn forget(&mut self, now: Duration) -> bool {
         let before = self.0.len();
-        self.0.retain(|_, trial| now.saturating_sub(trial.last) < MEMORY);
+        self.0.retain(|_, trial| now.saturating_sub(trial.last) < PROBATION_MEMORY);
         self.0.len() < before
     }
 

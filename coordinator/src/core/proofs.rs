@@ -15,7 +15,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::limits::WORKERS_MAX;
 use osteon_common::parameters::Point;
 use osteon_proto::evaluation::{self, EvaluationInput};
 use prost::Message as _;
@@ -23,17 +22,8 @@ use prost::Message as _;
 use crate::core::ballot::Ballot;
 use crate::core::ids::{BatchId, WorkerId};
 use crate::core::indices::Indices;
+use crate::core::policy::{PROOF_DIVISOR, PROOF_MAX, PROVEN_SETUPS_MAX, PROVEN_WORKERS_MAX};
 use crate::core::worker_name::WorkerName;
-
-/// Maximum number of realizations of a proof. Many of them show a defect that is seldom seen.
-const REALIZATIONS_MAX: u64 = 16;
-/// Number of realizations of an evaluation for each one of a proof beyond the first, so that short jobs can
-/// pay for the proofs of several hosts.
-const REALIZATIONS_DIVISOR: u64 = 300;
-/// Number of setups whose proofs are remembered.
-const SETUPS_MAX: usize = 64;
-/// Number of workers of which it is remembered that they gave a proof.
-const GIVEN_MAX: usize = 4 * WORKERS_MAX;
 
 /// Digest of what a solver is set up for: layers, probe, picking, solver settings, random quantities
 /// and what is asked for. Different setups have different keys.
@@ -93,7 +83,7 @@ impl SetupProofs {
 
     /// Records that a worker has given its proof.
     pub(crate) fn give(&mut self, name: &WorkerName) {
-        if self.given.len() >= GIVEN_MAX {
+        if self.given.len() >= PROVEN_WORKERS_MAX {
             self.given.pop_first();
         }
         self.given.insert(name.clone());
@@ -145,17 +135,15 @@ impl Proofs {
         (input, realizations): (EvaluationInput, u64),
         now: Duration,
     ) {
-        if self.0.len() >= SETUPS_MAX {
+        if self.0.len() >= PROVEN_SETUPS_MAX {
             // Those of setups in use are used all the time.
             let unused = self.0.iter().filter(|(_, proofs)| proofs.out.is_empty());
             if let Some(oldest) = unused.min_by_key(|(_, it)| it.used).map(|(setup, _)| *setup) {
                 self.0.remove(&oldest);
             }
         }
-        let indices = Indices {
-            first: 0,
-            count: (1 + realizations / REALIZATIONS_DIVISOR).min(REALIZATIONS_MAX),
-        };
+        let indices =
+            Indices { first: 0, count: (1 + realizations / PROOF_DIVISOR).min(PROOF_MAX) };
         let proofs = SetupProofs {
             input: Arc::new(input),
             ballot: Ballot::new(indices),

@@ -29,8 +29,6 @@ mod lifecycle;
 mod turn;
 
 pub(crate) use dispatch::batches::realizations_held;
-pub(crate) use dispatch::duplicates::DUPLICATES_MAX;
-pub(crate) use dispatch::speculation::CANDIDATES_MAX;
 pub use lifecycle::restore::Restored;
 
 #[cfg(test)]

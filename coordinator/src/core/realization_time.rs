@@ -3,9 +3,7 @@
 use std::time::Duration;
 
 use crate::core::fairness;
-
-/// Fraction of the previous estimate that is kept when an answer shows a shorter time.
-const KEPT: f64 = 0.5;
+use crate::core::policy::REALIZATION_TIME_KEPT;
 
 /// Time of one realization of a job on one slot. A slow answer raises the estimate at once, a fast
 /// one lowers it gradually: a search moves from points with fast realizations to points that take a
@@ -19,7 +17,7 @@ impl RealizationTime {
     /// slots.
     pub(crate) fn learn(&mut self, count: u64, slots: u32, seconds: f64) {
         let one = seconds / rounds_per_slot(count, slots);
-        self.0 = Some(self.0.map_or(one, |known| one.max(KEPT * known)));
+        self.0 = Some(self.0.map_or(one, |known| one.max(REALIZATION_TIME_KEPT * known)));
     }
 
     /// Returns whether there has been an answer.

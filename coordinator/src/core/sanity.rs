@@ -12,8 +12,8 @@ use crate::core::dispute::Dispute;
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::{Job, RequestName, Speculation, Stage};
-use crate::core::reactor::{CANDIDATES_MAX, DUPLICATES_MAX};
-use crate::core::state::{BATCHES_IN_FLIGHT_MAX, Banned, SETTLED_MAX, State};
+use crate::core::policy::{BATCHES_IN_FLIGHT_MAX, CANDIDATES_MAX, DUPLICATES_MAX, SETTLED_MAX};
+use crate::core::state::{Banned, State};
 use crate::core::worker_name::WorkerName;
 
 /// An inconsistency of a state.

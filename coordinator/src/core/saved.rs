@@ -5,7 +5,6 @@
 //! coordinator dies, only what was answered last is computed again.
 
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use osteon_common::parameters::{PARAMETERS, Point};
 
@@ -13,18 +12,9 @@ use crate::core::audit::{self, AuditKey};
 use crate::core::evaluation::{Audit, PendingEvaluation, StoredRecord};
 use crate::core::ids::JobId;
 use crate::core::indices::Indices;
+use crate::core::policy::PIECE_MAX;
 use crate::core::worker_name::WorkerName;
 use crate::store::{PIECE_OUTCOMES, PartPiece, PartRecord, PieceRecord};
-
-/// Results are saved when they, or their evaluation, are this old.
-pub(crate) const SAVE_AFTER: Duration = Duration::from_millis(1500);
-/// Interval at which further results of an evaluation are saved.
-pub(crate) const SAVE_EVERY: Duration = Duration::from_secs(1);
-/// Maximum number of results of an evaluation that are saved at once: nothing else happens while they
-/// are copied. The rest follows at the next tick.
-pub(crate) const SAVED_AT_ONCE_MAX: u64 = 1 << 18;
-/// Maximum number of results in a piece: it may be audited as a whole.
-const PIECE_MAX: usize = 4096;
 
 /// A point, to be compared to the bit.
 pub(crate) type PointBits = [u64; PARAMETERS];

@@ -24,6 +24,7 @@ use crate::core::fairness::Shares;
 use crate::core::ids::{BatchId, JobId, LeaseId, WorkerId};
 use crate::core::job::{EndedJob, Job, RequestName, Stage};
 use crate::core::notice::Departure;
+use crate::core::policy::{LOST_IN_A_ROW_MAX, SETTLED_MAX};
 use crate::core::probation::Probation;
 use crate::core::proofs::{Proofs, SetupKey};
 use crate::core::rate::Rate;
@@ -32,17 +33,10 @@ use crate::core::service_order::ServiceOrder;
 use crate::core::worker_name::WorkerName;
 use crate::store::{BanRecord, JobRecord};
 
-/// Maximum number of batches that a worker holds: it computes one while the next is on its way.
-pub const BATCHES_IN_FLIGHT_MAX: usize = 2;
-/// Number of workers of a host lost in a row after which its workers receive only work that can do
-/// little harm if they are lost again.
-const LOST_IN_A_ROW_MAX: usize = 3;
 /// Number of lost workers that are remembered per host.
 const LOST_SHOWN_MAX: usize = 99;
 /// Number of departed workers that are remembered, to be listed.
 pub(crate) const DEPARTED_MAX: usize = 64;
-/// Number of settled batches that are remembered per worker, to compare late answers with.
-pub(crate) const SETTLED_MAX: usize = 16;
 
 /// State of a coordinator.
 #[derive(Debug)]

@@ -3,13 +3,9 @@
 
 use crate::core::batch::Purpose;
 use crate::core::ids::WorkerId;
+use crate::core::policy::{BATCHES_IN_FLIGHT_MAX, MANY_WORKERS};
 use crate::core::service_order::ServicePlace;
-use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
-
-/// Number of workers from which on one whose speed at a job is not known gets nothing beside its batch of
-/// that job. A second one, as small as the first, would cost more than the moment for which the worker is
-/// idle after its answer.
-const MANY_WORKERS: usize = 16;
+use crate::core::state::{AttachedWorker, State};
 
 impl State {
     /// Updates the places when a worker has come or gone.

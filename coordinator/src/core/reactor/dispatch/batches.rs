@@ -9,11 +9,9 @@ use crate::core::evaluation::Audit;
 use crate::core::fairness;
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::Speculation;
+use crate::core::policy::{AUDIT_LOSSES_MAX, BATCHES_IN_FLIGHT_MAX};
 use crate::core::reactor::turn::Turn;
-use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
-
-/// Number of workers that may be lost over one audit before it is given up.
-const LOST_MAX: u32 = 3;
+use crate::core::state::{AttachedWorker, State};
 
 /// Sends a batch to a worker and returns its number, if its evaluation is under way.
 pub(crate) fn send(
@@ -185,7 +183,7 @@ fn give_back_audit(state: &mut State, batch: &Batch, loss: &LostWorker) {
         return;
     }
     if let Some(evaluation) = state.evaluation_of_mut(&batch.assignment)
-        && lost + crashed < LOST_MAX
+        && lost + crashed < AUDIT_LOSSES_MAX
         && let Some(by) = evaluation.owner(indices.first)
     {
         evaluation.audits.push_front(Audit { indices, by, lost: lost + crashed });

@@ -5,23 +5,17 @@ use std::time::Duration;
 use super::{batches, eta};
 use crate::core::batch::{Batch, Purpose};
 use crate::core::ids::{BatchId, WorkerId};
+use crate::core::policy::{DUPLICATES_MAX, LATE_FACTOR};
 use crate::core::reactor::turn::Turn;
 use crate::core::service_order::ServicePlace;
 use crate::core::state::State;
-
-/// Maximum number of batches with the same indices at a time. The last of them would be sent after
-/// six minutes at the earliest.
-pub(crate) const DUPLICATES_MAX: usize = 8;
-/// A batch that has taken this many times its expected time is duplicated before anything is
-/// computed speculatively.
-const LATE: u32 = 2;
 
 /// Sends each otherwise idle worker a duplicate of a late batch, starting with the batch that has
 /// been out longest.
 pub(crate) fn duplicate_late_batches(turn: &mut Turn) {
     let now = turn.now;
     let late = |state: &State, batch: &Batch| {
-        now.saturating_sub(batch.sent) >= LATE * eta::expected(state, batch)
+        now.saturating_sub(batch.sent) >= LATE_FACTOR * eta::expected(state, batch)
     };
     let idle = |place: &ServicePlace| place.held == 0;
     duplicate(turn, idle, late);
@@ -40,7 +34,7 @@ fn duplicate(
     idle: impl Fn(&ServicePlace) -> bool,
     worth: impl Fn(&State, &Batch) -> bool,
 ) {
-    let patience = turn.state.config.batch_target / 2 + LATE * turn.state.delay.mean();
+    let patience = turn.state.config.batch_target / 2 + LATE_FACTOR * turn.state.delay.mean();
     let old = |batch: &Batch, now: Duration| now.saturating_sub(batch.sent) >= patience;
     loop {
         let (state, now) = (&*turn.state, turn.now);

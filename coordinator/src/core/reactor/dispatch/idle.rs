@@ -18,15 +18,9 @@ use crate::core::fairness;
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::indices::Indices;
 use crate::core::job::{Job, Stage};
+use crate::core::policy::{BATCHES_IN_FLIGHT_MAX, IDLE_AT_ONCE, SPECULATIVE_BATCHES_MIN};
 use crate::core::reactor::turn::Turn;
-use crate::core::state::{AttachedWorker, BATCHES_IN_FLIGHT_MAX, State};
-
-/// Maximum number of idle workers that are looked at after an event: a walk over a large fleet would take
-/// longer than its speculation is worth.
-const IDLE_AT_ONCE: usize = 256;
-/// Number of speculative batches that may be out however soon they are computed: a coordinator of few
-/// workers has time for them.
-const OUT_MIN: usize = 16;
+use crate::core::state::{AttachedWorker, State};
 
 /// ETA of the last batch of each evaluation that a search waits for.
 type Etas = BTreeMap<JobId, Duration>;
@@ -68,7 +62,9 @@ pub(crate) fn dispatch(turn: &mut Turn) {
 /// coordinator serves while one is computed. More of them would delay the answers that the search waits for.
 fn out_max(state: &State, id: JobId, worker: WorkerId, size: u64) -> usize {
     let rate = state.workers.get(&worker).and_then(|it| it.rates.get(&id));
-    rate.map_or(OUT_MIN, |rate| sizing::served_within(size as f64 / rate).max(OUT_MIN))
+    rate.map_or(SPECULATIVE_BATCHES_MIN, |rate| {
+        sizing::served_within(size as f64 / rate).max(SPECULATIVE_BATCHES_MIN)
+    })
 }
 
 /// Chooses the point to compute speculatively next, and its job. First come points that a search

@@ -11,7 +11,6 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use super::duplicates::DUPLICATES_MAX;
 use super::poison::{self, Reputation};
 use super::{batches, duplicates, schedule};
 use crate::core::batch::{Assignment, Batch, Purpose};
@@ -19,24 +18,12 @@ use crate::core::crashes::Crashes;
 use crate::core::dispute::Dispute;
 use crate::core::fairness;
 use crate::core::ids::{BatchId, JobId, WorkerId};
+use crate::core::policy::{
+    DUPLICATES_MAX, MISSED_MAX, OVERDUE_AT_ONCE_MAX, OVERDUE_FACTOR, OVERDUE_MIN, SILENT_MAX,
+};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, State};
 use crate::core::worker_name::WorkerName;
-
-/// No batch is overdue before this time. A worker, a network or a machine may pause for a second or
-/// two without being faulty.
-const OVERDUE_MIN: Duration = Duration::from_secs(3);
-/// No batch is overdue before it has taken this many times its expected time: a machine may have
-/// other things to do, and one point may take several times as long as another.
-const OVERDUE_FACTOR: u32 = 4;
-/// Maximum number of duplicates that are sent on one event; the others follow on the next.
-const SENT_AT_ONCE_MAX: usize = 64;
-/// A worker is on probation after this many consecutive batches that others answered, over at least
-/// [`OVERDUE_MIN`]. It holds two at a time, so a single pause is not enough.
-const MISSED_MAX: u32 = 3;
-/// A worker whose batch is overdue, and has been out for this long, is on probation too: there may
-/// be no other worker to answer the batch.
-const SILENT_MAX: Duration = Duration::from_secs(60);
 
 /// Finds batches that are overdue.
 pub(crate) fn tick(turn: &mut Turn) {
@@ -146,7 +133,7 @@ pub(crate) fn dispatch(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
         };
         let (job, alone) = (batch.assignment.job, batch.purpose == Purpose::Exclusive);
         // Since the last tick an answer may have shown that the job is slow.
-        if sent >= SENT_AT_ONCE_MAX
+        if sent >= OVERDUE_AT_ONCE_MAX
             || (free.is_empty() && !alone)
             || !is_overdue(turn.state, id, turn.now)
             || (busy && has_scout(turn.state, job, turn.now))

@@ -20,12 +20,10 @@ use crate::core::crashes::Crashes;
 use crate::core::failure::RunFailure;
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::indices::Indices;
+use crate::core::policy::CRASH_MEMORY;
 use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, State};
 use crate::core::worker_name::WorkerName;
-
-/// Time for which the crashes of a host are remembered when no more come.
-const MEMORY: Duration = Duration::from_secs(600);
 
 /// Reputation of a worker for a task, lower is better. In order of weight: whether its host's
 /// workers are lost whatever they hold, whether it is on probation (which costs time, but fails no
@@ -104,7 +102,7 @@ pub(crate) fn forget_crashes(state: &mut State, name: &WorkerName) {
 
 /// Forgets the crashes of hosts that have not lost a worker for a long time.
 pub(crate) fn forget_old_crashes(state: &mut State, now: Duration) {
-    state.lost_in_a_row.retain(|_, lost| now.saturating_sub(lost.last) < MEMORY);
+    state.lost_in_a_row.retain(|_, lost| now.saturating_sub(lost.last) < CRASH_MEMORY);
 }
 
 /// Returns the failure of a job with a poison realization, if it has one.

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use crate::core::ballot::VOTERS_MAX;
 use crate::core::batch::{Assignment, Batch, Purpose};
 use crate::core::effect::Effect;
 use crate::core::ids::{BatchId, JobId, WorkerId};
+use crate::core::policy::VOTERS_MAX;
 use crate::core::proofs::SetupKey;
 use crate::core::reactor::turn::Turn;
 use crate::core::state::AttachedWorker;

@@ -16,33 +16,11 @@ use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 use super::ahead;
 use crate::core::ids::JobId;
 use crate::core::job::{FleetRate, Job};
+use crate::core::policy::{
+    AUDIT_S, BATCH_COST_S, BATCH_WORTH_S, FIRST_BATCH_PER_SLOT, FLEET_RATE_USES_MIN,
+    RATED_WORKERS_MIN, SHARE_DIVISOR, UNKNOWN_AT_ONCE, UNKNOWN_TIME,
+};
 use crate::core::state::{AttachedWorker, State};
-
-/// Realizations for each slot in a worker's first batch of a job: enough to measure its rate, few
-/// enough to be answered soon.
-const FIRST_BATCH_PER_SLOT: u32 = 4;
-/// A batch holds at most this fraction (1 over the constant) of a worker's share of the remaining
-/// realizations. It may hold more to give each of the worker's slots one realization, up to the share,
-/// or to be worth its cost.
-const SHARE_DIVISOR: f64 = 4.0;
-/// Time that a batch costs the coordinator, s.
-const BATCH_COST_S: f64 = 1e-4;
-/// Time that a batch takes its worker, s, from which on its cost does not matter.
-const WORTH_S: f64 = 0.02;
-/// Time that an audit takes at least on a worker like the one audited, s. With 1 % of audits each worker is
-/// audited once a second in the mean.
-const AUDIT_S: f64 = 0.01;
-/// Number of workers that must have computed something of a job before it is known how fast one of the
-/// others may be.
-const KNOWN_MIN: u64 = 8;
-/// Maximum number of batches of a job that are sent within [`UNKNOWN_TIME`] although nobody knows how long they
-/// take. The other workers get theirs after later events. By then some may have answered, and it is known
-/// how large a batch should be.
-const UNKNOWN_AT_ONCE: usize = 256;
-/// Time in which so many batches of unknown duration may be sent. Short ones are answered within it.
-const UNKNOWN_TIME: Duration = Duration::from_millis(25);
-/// Number of batches for which the rate of a fleet is used at least.
-const USES_MIN: u64 = 32;
 
 /// Returns the number of realizations of `job`, of which `queued` are left in its evaluation and
 /// `further` in others, that `attached` gets at once: as many as it computes in the target time, at
@@ -71,15 +49,16 @@ pub(crate) fn batch_size(
     let left = (queued + further) as f64;
     let share = left * (weight / fleet.total.max(weight));
     let all = realizations(state, job);
-    let worth_s = rate.map_or(WORTH_S, |rate| worth_s(left / rate, all / rate, fleet.workers));
+    let worth_s =
+        rate.map_or(BATCH_WORTH_S, |rate| worth_s(left / rate, all / rate, fleet.workers));
     let worth = rate.map_or(0.0, |rate| (worth_s * rate).min(left));
     let target_s = state.config.batch_target.as_secs_f64();
     // As long as nothing is known, one for each slot takes no longer than fewer.
     let filled = if rate.is_some() { slots.min(share) } else { slots };
     let most = (share / SHARE_DIVISOR).max(filled).max(worth).ceil();
     let target = match rate {
-        Some(rate) if further > 0 => rate * WORTH_S.min(target_s),
-        Some(rate) if measured.is_none() => rate * WORTH_S.max(worth_s).min(target_s),
+        Some(rate) if further > 0 => rate * BATCH_WORTH_S.min(target_s),
+        Some(rate) if measured.is_none() => rate * BATCH_WORTH_S.max(worth_s).min(target_s),
         Some(rate) => rate * target_s,
         None => f64::from(FIRST_BATCH_PER_SLOT) * slots,
     };
@@ -139,7 +118,7 @@ fn realizations(state: &State, id: JobId) -> f64 {
 /// Returns whether a job must wait until it is known how large its batches should be: so many were sent that
 /// there may soon be answers.
 pub(crate) fn must_wait(job: &Job) -> bool {
-    job.unknown_sent >= UNKNOWN_AT_ONCE && job.rated_workers < KNOWN_MIN
+    job.unknown_sent >= UNKNOWN_AT_ONCE && job.rated_workers < RATED_WORKERS_MIN
 }
 
 /// Lets jobs send batches of unknown duration again after a while without answers.
@@ -157,7 +136,7 @@ pub(crate) fn forget_unknown(state: &mut State, now: Duration) {
 /// enough of them are known.
 pub(crate) fn rate(attached: &AttachedWorker, job: JobId, fleet: FleetRate) -> Option<f64> {
     let of_others = || f64::from(attached.hello.slots) * fleet.per_slot;
-    let is_known = fleet.rated_workers >= KNOWN_MIN;
+    let is_known = fleet.rated_workers >= RATED_WORKERS_MIN;
     attached.rates.get(&job).copied().or_else(|| is_known.then(of_others))
 }
 
@@ -167,7 +146,7 @@ pub(crate) fn rate(attached: &AttachedWorker, job: JobId, fleet: FleetRate) -> O
 fn worth_s(left_s: f64, all_s: f64, workers: usize) -> f64 {
     let round_s = workers as f64 * BATCH_COST_S;
     let basis_s = if suffice(workers, all_s) { all_s.max(left_s) } else { left_s };
-    best_s(basis_s).min(round_s.max(WORTH_S))
+    best_s(basis_s).min(round_s.max(BATCH_WORTH_S))
 }
 
 /// Returns whether workers suffice for one batch each of an evaluation that takes one of them this time, s.
@@ -191,7 +170,7 @@ pub(crate) fn served_within(seconds: f64) -> usize {
 /// workers, so that each of them pays for one; at once if workers came or went, or if twice as many of
 /// them have computed something of the job.
 pub(crate) fn fleet_rate(state: &mut State, id: JobId) -> FleetRate {
-    let uses_max = USES_MIN.max(state.workers.len() as u64);
+    let uses_max = FLEET_RATE_USES_MIN.max(state.workers.len() as u64);
     let changes = state.fleet_changes;
     if let Some(Job { fleet: Some(fleet), rated_workers, .. }) = state.jobs.get_mut(&id) {
         let is_current = fleet.changes == changes

@@ -22,15 +22,11 @@ use crate::core::batch::{Assignment, Purpose};
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{BatchId, JobId};
 use crate::core::job::{Job, Speculation, Stage};
+use crate::core::policy::{CANDIDATES_MAX, SPECULATIVE_REALIZATIONS_MAX};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
 use crate::core::worker_name::WorkerName;
 use osteon_search::same_point;
-
-/// Maximum number of candidates of each job.
-pub(crate) const CANDIDATES_MAX: usize = 8;
-/// Evaluations with more realizations leave no worker idle for long; none of them is speculative.
-const REALIZATIONS_MAX: u64 = 20_000;
 
 /// Begins the evaluation of the point that a job's search asks for, with any speculative results.
 pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
@@ -112,7 +108,7 @@ fn speculates(config: &Config, job: &Job) -> bool {
     let specification = &job.record.specification;
     config.speculation
         && specification.kind == JobKind::Identification
-        && specification.monte_carlo.realizations <= REALIZATIONS_MAX
+        && specification.monte_carlo.realizations <= SPECULATIVE_REALIZATIONS_MAX
         && !job.cancelled
         // Other parts of the search are certain work.
         && job.ahead.branches.is_empty()

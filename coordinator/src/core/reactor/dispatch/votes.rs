@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::core::ballot::VOTERS_MAX;
 use crate::core::dispute::Dispute;
 use crate::core::ids::{BatchId, WorkerId};
+use crate::core::policy::VOTERS_MAX;
 use crate::core::state::{AttachedWorker, State};
 
 /// Returns whether a dispute needs more votes than are on their way.

@@ -13,16 +13,12 @@ use crate::core::close_reason::CloseReason;
 use crate::core::fairness;
 use crate::core::ids::{BatchId, WorkerId};
 use crate::core::job::Job;
+use crate::core::policy::{ELAPSED_MIN_S, RATE_WEIGHT};
 use crate::core::reactor::dispatch::{batches, departures, overdue};
 use crate::core::reactor::lifecycle::{jobs, workers};
 use crate::core::reactor::turn::Turn;
 use crate::core::state::{EarlyAnswer, State};
 use crate::core::worker_name::WorkerName;
-
-/// Weight of the newest measurement in a worker's rate.
-const RATE_WEIGHT: f64 = 0.5;
-/// A reported computing time below this, in seconds, is not accepted.
-const ELAPSED_MIN_S: f64 = 1e-6;
 
 /// Takes in a worker's answer. If the batch was settled before (a duplicate was faster, or the
 /// answer came twice), the answer is only compared with the known results; the answer to an unknown

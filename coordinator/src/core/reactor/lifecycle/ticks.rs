@@ -9,9 +9,10 @@ use crate::core::effect::{Effect, Record};
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::job::{Stage, sequence};
 use crate::core::notice::Notice;
+use crate::core::policy::{SAVE_AFTER, SAVE_EVERY, SAVED_AT_ONCE_MAX};
 use crate::core::reactor::dispatch::{clearance, poison};
 use crate::core::reactor::turn::Turn;
-use crate::core::saved::{self, SAVE_AFTER, SAVE_EVERY, SAVED_AT_ONCE_MAX};
+use crate::core::saved;
 use crate::core::snapshot;
 use crate::core::state::{AttachedWorker, State};
 
