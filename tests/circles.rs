@@ -13,7 +13,8 @@ use std::fs;
 use std::path::Path;
 
 /// Directories whose files must not form a circle, each the `src` of a crate.
-const DIRECTORIES: [&str; 4] = ["common/src", "coordinator/src", "files/src", "worker/src"];
+const DIRECTORIES: [&str; 5] =
+    ["common/src", "coordinator/src", "files/src", "solver/src", "worker/src"];
 /// Maximum number of re-exports that are followed one after another.
 const SIGNPOSTS_MAX: usize = 8;
 
@@ -210,7 +211,9 @@ impl Code {
                 _ => public,
             };
             let known = ["crate", "super", "self"].contains(&word) || children.contains(word);
-            if !(begins && leads && known) {
+            // `pub(in crate::…)` says who may name an item, and names none itself.
+            let grants = self.words[..at].ends_with(&["pub", "(", "in"].map(str::to_owned));
+            if !(begins && leads && known) || grants {
                 at += 1;
                 continue;
             }
@@ -391,6 +394,7 @@ fn what_is_no_circle_is_none() {
         "#[cfg(test)]\nmod tests { use crate::a::A; }",
         "#[cfg(test)]\nuse crate::a::A;",
         "use self::b::B; fn f() { x.crate::a::A }",
+        "pub(in crate::a) struct B;",
     ] {
         check(&[lib, a, ("b.rs", b)], &[]);
     }
