@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use osteon_proto::connection::{self, ConnectError};
 use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint::{self, ConnectError};
 use osteon_proto::malformed::Malformed;
 use osteon_proto::patience::Patience;
 use osteon_proto::v1::backup_response::Part;
@@ -88,7 +88,7 @@ pub(crate) async fn health(remote: &Remote, limit: Duration) -> Result<bool, Cli
     let mut patience = Patience::of(limit);
     let connected = async {
         let credentials = loaded(&files, endpoint).await?;
-        let connected = endpoint::connect_with(endpoint, &credentials, limit);
+        let connected = connection::connect_with(endpoint, &credentials, limit);
         // The connection keeps the limit by itself; what it took is no longer left for the answer.
         let late =
             |_| ConnectError::Timeout { endpoint: endpoint.clone(), seconds: limit.as_secs_f64() };
