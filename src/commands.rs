@@ -25,28 +25,70 @@ use crate::exit_status::{CommandFailure, ExitStatus};
 use crate::resolved::Resolved;
 use crate::signals::unless_interrupted;
 
-/// Message for interrupted commands that have not started anything visible to others.
-const NOTHING_LEFT: &str = "nothing was changed";
-
 /// Executes the command line.
 ///
 /// # Errors
-/// If the command fails.
+/// If the command fails, or was interrupted.
 pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
+    match left_by_interruption(&resolved) {
+        Some(left) => unless_interrupted(perform(resolved), left).await,
+        None => perform(resolved).await,
+    }
+}
+
+/// Returns what is said of what an interrupted command leaves behind; `None` of commands that treat
+/// interruptions themselves, or end at once.
+fn left_by_interruption(resolved: &Resolved) -> Option<&'static str> {
+    match resolved {
+        Resolved::Run { .. }
+        | Resolved::Draw(_)
+        | Resolved::Report(_)
+        | Resolved::Umbridge(_)
+        | Resolved::Coordinator(_)
+        | Resolved::Worker { .. }
+        | Resolved::Certs(_)
+        | Resolved::Token(_)
+        | Resolved::Init(_)
+        | Resolved::Schema(_)
+        | Resolved::Materials(_)
+        | Resolved::Completions(_)
+        | Resolved::Man(_)
+        | Resolved::JobScript(_)
+        | Resolved::WorkerArray(_) => None,
+        Resolved::Check { .. }
+        | Resolved::Doctor { .. }
+        | Resolved::Jobs { .. }
+        | Resolved::Explain { .. }
+        | Resolved::Workers { .. }
+        | Resolved::Health { .. } => Some("nothing was changed"),
+        Resolved::Simulate { .. } => Some("no results were saved"),
+        Resolved::Observe { .. } => Some("no file was written"),
+        Resolved::Submit { .. } => Some("the job may have been accepted (see `osteon jobs`)"),
+        Resolved::Prune { .. } => Some("jobs may have been deleted (see `osteon jobs`)"),
+        Resolved::Watch { .. } => Some("the job continues (see `osteon jobs`, `osteon cancel`)"),
+        Resolved::Recheck { .. } => Some("the job may be computed again (see `osteon jobs`)"),
+        Resolved::Unban { .. } => Some("the ban may have been lifted (see `osteon workers`)"),
+        Resolved::Cancel { .. } => Some("the job may have been cancelled (see `osteon jobs`)"),
+        Resolved::Fetch { .. } => Some("run the same command again to fetch the results"),
+        Resolved::DrainWorker { .. } => {
+            Some("the worker may have been told to drain (see `osteon workers`)")
+        }
+        Resolved::ScaleWorkers(_) => {
+            Some("workers that wait or run stay, and end when they have had no work for a while")
+        }
+        Resolved::Backup { .. } => Some("no copy was kept"),
+    }
+}
+
+async fn perform(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
     match resolved {
         Resolved::Run { run, isa } => run::run(run, isa).await,
-        Resolved::Simulate { arguments, isa } => {
-            let left = "no results were saved";
-            unless_interrupted(simulate::simulate(arguments, isa), left).await
-        }
-        Resolved::Check { arguments, isa, cores } => {
-            unless_interrupted(check::check(arguments, isa, cores), NOTHING_LEFT).await
-        }
+        Resolved::Simulate { arguments, isa } => simulate::simulate(arguments, isa).await,
+        Resolved::Check { arguments, isa, cores } => check::check(arguments, isa, cores).await,
         Resolved::Draw(arguments) => draw::draw(&arguments),
         Resolved::Report(arguments) => report::report(&arguments),
         Resolved::Observe { arguments, isa, threads } => {
-            let left = "no file was written";
-            unless_interrupted(observe::observe(arguments, isa, threads), left).await
+            observe::observe(arguments, isa, threads).await
         }
         Resolved::Umbridge(service) => umbridge::serve(*service).await,
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
@@ -58,67 +100,41 @@ pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure
         Resolved::Init(arguments) => init::write(&arguments),
         Resolved::Schema(arguments) => schema::print(&arguments),
         Resolved::Materials(arguments) => materials::print(&arguments),
-        Resolved::Doctor { patient, format } => {
-            unless_interrupted(doctor::examine(patient, format), NOTHING_LEFT).await
-        }
+        Resolved::Doctor { patient, format } => doctor::examine(patient, format).await,
         Resolved::Completions(arguments) => man::completions(&arguments),
         Resolved::Man(arguments) => man::write(&arguments),
         Resolved::Submit { job, kind, request, options, coordinator, format } => {
             let submission = jobs::Submission { job: &job, kind, request: &request, options };
-            let left = "the job may have been accepted (see `osteon jobs`)";
-            unless_interrupted(jobs::submit(submission, &coordinator, format), left).await
+            jobs::submit(submission, &coordinator, format).await
         }
         Resolved::Prune { older_than, keep_last, coordinator, format } => {
-            let left = "jobs may have been deleted (see `osteon jobs`)";
-            let pruned = jobs::prune(older_than, keep_last, &coordinator, format);
-            unless_interrupted(pruned, left).await
+            jobs::prune(older_than, keep_last, &coordinator, format).await
         }
-        Resolved::Jobs { coordinator, format } => {
-            unless_interrupted(jobs::list(&coordinator, format), NOTHING_LEFT).await
-        }
+        Resolved::Jobs { coordinator, format } => jobs::list(&coordinator, format).await,
         Resolved::Watch { job, coordinator, format } => {
-            let left = "the job continues (see `osteon jobs`, `osteon cancel`)";
-            unless_interrupted(jobs::watch(&job, &coordinator, format), left).await
+            jobs::watch(&job, &coordinator, format).await
         }
         Resolved::Explain { job, coordinator, format } => {
-            unless_interrupted(jobs::explain(&job, &coordinator, format), NOTHING_LEFT).await
+            jobs::explain(&job, &coordinator, format).await
         }
         Resolved::Recheck { job, coordinator, format } => {
-            let left = "the job may be computed again (see `osteon jobs`)";
-            unless_interrupted(jobs::recheck(&job, &coordinator, format), left).await
+            jobs::recheck(&job, &coordinator, format).await
         }
-        Resolved::Unban { host, coordinator } => {
-            let left = "the ban may have been lifted (see `osteon workers`)";
-            unless_interrupted(operators::unban(&host, &coordinator), left).await
-        }
-        Resolved::Cancel { job, coordinator } => {
-            let left = "the job may have been cancelled (see `osteon jobs`)";
-            unless_interrupted(jobs::cancel(&job, &coordinator), left).await
-        }
-        Resolved::Fetch { job, coordinator, out } => {
-            let left = "run the same command again to fetch the results";
-            unless_interrupted(jobs::fetch(&job, &coordinator, &out), left).await
-        }
-        Resolved::Workers { coordinator, format } => {
-            unless_interrupted(operators::workers(&coordinator, format), NOTHING_LEFT).await
-        }
+        Resolved::Unban { host, coordinator } => operators::unban(&host, &coordinator).await,
+        Resolved::Cancel { job, coordinator } => jobs::cancel(&job, &coordinator).await,
+        Resolved::Fetch { job, coordinator, out } => jobs::fetch(&job, &coordinator, &out).await,
+        Resolved::Workers { coordinator, format } => operators::workers(&coordinator, format).await,
         Resolved::DrainWorker { worker, coordinator, format } => {
-            let left = "the worker may have been told to drain (see `osteon workers`)";
-            unless_interrupted(operators::drain(worker, &coordinator, format), left).await
+            operators::drain(worker, &coordinator, format).await
         }
-        Resolved::ScaleWorkers(plan) => {
-            let left =
-                "workers that wait or run stay, and end when they have had no work for a while";
-            unless_interrupted(scaling::follow(*plan), left).await
-        }
+        Resolved::ScaleWorkers(plan) => scaling::follow(*plan).await,
         Resolved::JobScript(script) => slurm::job(&script),
         Resolved::WorkerArray(array) => slurm::array(&array),
         Resolved::Health { coordinator, limit, format } => {
-            unless_interrupted(operators::health(&coordinator, limit, format), NOTHING_LEFT).await
+            operators::health(&coordinator, limit, format).await
         }
         Resolved::Backup { directory, coordinator, format } => {
-            let made = operators::backup(&directory, &coordinator, format);
-            unless_interrupted(made, "no copy was kept").await
+            operators::backup(&directory, &coordinator, format).await
         }
     }
 }

@@ -22,8 +22,9 @@ mod support;
 use std::sync::Arc;
 use std::time::Instant;
 
+use osteon_proto::connection::{Connection, connect_with, jobs_client};
 use osteon_proto::credentials::{ALPN, CredentialFiles, Credentials, roots};
-use osteon_proto::endpoint::{Connection, Endpoint, connect_with, jobs_client};
+use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::ListRequest;
 use secure::Secure;
 use service::Service;

@@ -29,7 +29,7 @@ mod support;
 use std::net::TcpListener;
 
 use osteon_common::job::JobKind;
-use osteon_proto::endpoint::{connect, workers_client};
+use osteon_proto::connection::{connect, workers_client};
 use osteon_proto::v1::attach_request::Message;
 use osteon_proto::v1::{AttachRequest, SubmitRequest, WorkerHello};
 use page::{Page, Updates};

@@ -248,30 +248,98 @@ fn files_and_functions_are_short() {
         if lines.len() > FILE_LINES_MAX {
             long.push(format!("{}: {} lines", path.display(), lines.len()));
         }
-        for (start, line) in lines.iter().enumerate() {
-            let code = line.trim_start();
-            let opens = [
-                "fn ",
-                "pub fn ",
-                "pub(crate) fn ",
-                "pub(super) fn ",
-                "async fn ",
-                "pub async fn ",
-            ]
-            .iter()
-            .any(|word| code.starts_with(word));
-            if !opens {
-                continue;
-            }
-            // The code is formatted, so a function ends at its own indentation.
-            let end = format!("{}}}", &line[..line.len() - code.len()]);
-            let length = lines[start..].iter().position(|line| *line == end).unwrap_or(0);
+        for start in 0..lines.len() {
+            let length = function_length(&lines[start..]).unwrap_or(0);
             if length > FUNCTION_LINES_MAX {
                 long.push(format!("{}:{}: {length} lines", path.display(), start + 1));
             }
         }
     }
     assert!(long.is_empty(), "too long:\n{}", long.join("\n"));
+}
+
+/// Returns the number of lines of the function that begins with the first of formatted lines; `None` if
+/// none does, or if it has no body.
+fn function_length(lines: &[&str]) -> Option<usize> {
+    let first = lines.first()?;
+    let code = first.trim_start();
+    if !is_function(code) {
+        return None;
+    }
+    let signature_end = lines.iter().position(|line| line.ends_with([';', '{', '}']))?;
+    if !lines[signature_end].ends_with('{') {
+        return None;
+    }
+    // The code is formatted, so a function ends at its own indentation.
+    let end = format!("{}}}", &first[..first.len() - code.len()]);
+    lines.iter().position(|line| *line == end)
+}
+
+/// Returns whether a function begins with this code, whatever words come before `fn`.
+fn is_function(code: &str) -> bool {
+    let Some((before, _)) = code.split_once("fn ") else { return false };
+    let words = ["pub", "default", "const", "async", "unsafe", "safe", "extern"];
+    let mut rest = before;
+    while !rest.is_empty() {
+        let after = match rest.strip_prefix("pub(").or_else(|| rest.strip_prefix('"')) {
+            // To whom it is visible, or the name of a calling convention.
+            Some(inside) => inside.split_once([')', '"']).map(|(_, after)| after),
+            None => words.iter().find_map(|word| rest.strip_prefix(word)),
+        };
+        match after.and_then(|after| after.strip_prefix(' ')) {
+            Some(after) => rest = after,
+            None => return false,
+        }
+    }
+    true
+}
+
+#[test]
+fn functions_of_every_form_are_measured() {
+    let body = ["    a();", "    b();", "}"];
+    for before in [
+        "",
+        "pub ",
+        "pub(crate) ",
+        "pub(in crate::a) ",
+        "async ",
+        "pub(super) async ",
+        "const ",
+        "pub const unsafe ",
+        "unsafe extern \"C\" ",
+        "pub extern \"system\" ",
+        "extern ",
+        "default async ",
+    ] {
+        for signature in
+            [&["fn f() {"][..], &["fn f(", "    a: A,", ") -> B", "where", "    A: C,", "{"]]
+        {
+            let first = format!("{before}{}", signature[0]);
+            let lines: Vec<&str> = [first.as_str()]
+                .into_iter()
+                .chain(signature[1..].iter().copied())
+                .chain(body)
+                .collect();
+            assert_eq!(function_length(&lines), Some(lines.len() - 1), "{lines:?}");
+            // A method ends at its own indentation.
+            let indented: Vec<String> = lines.iter().map(|line| format!("    {line}")).collect();
+            let mut inside: Vec<&str> = indented.iter().map(String::as_str).collect();
+            inside.push("}");
+            assert_eq!(function_length(&inside), Some(lines.len() - 1), "{inside:?}");
+        }
+    }
+    for line in [
+        "let a = |b| b;",
+        "// A fn f() {",
+        "table: fn(&Draws) -> Table,",
+        "impl<F: Fn(A)> B for F {",
+        "fn f(&self);",
+        "fn f() {}",
+        "fn f() -> A { b() }",
+        "println!(\"fn f() {",
+    ] {
+        assert_eq!(function_length(&[line, "}"]), None, "{line}");
+    }
 }
 
 #[test]

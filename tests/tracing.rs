@@ -24,7 +24,7 @@ use opentelemetry_proto::tonic::trace::v1::Span;
 use osteon_common::job::JobKind;
 use osteon_files::job_file;
 use osteon_proto::v1::SubmitRequest;
-use osteon_proto::{endpoint, specification};
+use osteon_proto::{connection, specification};
 use support::{Finished, Owned, Scratch, eventually, job, osteon, text};
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
@@ -211,6 +211,7 @@ async fn submit_with(url: &str, file: &Path, parent: &str) -> String {
         ..SubmitRequest::default()
     });
     request.metadata_mut().insert("traceparent", parent.parse().unwrap());
-    let channel = endpoint::connect(&url.parse().unwrap(), Duration::from_secs(10)).await.unwrap();
-    endpoint::jobs_client(channel).submit(request).await.unwrap().into_inner().job
+    let channel =
+        connection::connect(&url.parse().unwrap(), Duration::from_secs(10)).await.unwrap();
+    connection::jobs_client(channel).submit(request).await.unwrap().into_inner().job
 }

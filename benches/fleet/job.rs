@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
 use osteon_common::job::JobSpecification;
-use osteon_proto::endpoint::{Endpoint, connect, jobs_client};
+use osteon_proto::connection::{connect, jobs_client};
+use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{FetchRequest, JobState, JobStatus, SubmitRequest, WatchRequest};

@@ -7,8 +7,9 @@ use std::time::{Duration, SystemTime};
 use osteon_common::job::JobSpecification;
 use osteon_common::results::Status as JobStatus;
 use osteon_proto::choice::JOB_STATUS;
+use osteon_proto::connection::{self, ConnectError, Connection};
 use osteon_proto::credentials::{CredentialFiles, Credentials};
-use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
+use osteon_proto::endpoint::Endpoint;
 use osteon_proto::malformed::Malformed;
 use osteon_proto::patience::Patience;
 use osteon_proto::spans::{AttributeValue, OpenSpan, TRACEPARENT, TraceContext};
@@ -87,9 +88,9 @@ impl Client {
         let mut patience = Patience::of(answer_limit());
         loop {
             let left = patience.left();
-            let attempt = endpoint::connect_with(endpoint, credentials, left);
+            let attempt = connection::connect_with(endpoint, credentials, left);
             let error = match patience.wait_for(attempt).await {
-                Ok(Ok(connection)) => return Ok(endpoint::jobs_client(connection)),
+                Ok(Ok(found)) => return Ok(connection::jobs_client(found)),
                 Ok(Err(error)) => error,
                 Err(_) => ConnectError::Timeout {
                     endpoint: endpoint.clone(),

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use osteon_proto::connection::{self, ConnectError};
 use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint::{self, ConnectError};
 use osteon_proto::malformed::Malformed;
 use osteon_proto::patience::Patience;
 use osteon_proto::v1::backup_response::Part;
@@ -92,7 +92,7 @@ pub async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientErro
     let mut patience = Patience::of(limit);
     let connected = async {
         let credentials = loaded(&files, endpoint).await?;
-        let connected = endpoint::connect_with(endpoint, &credentials, limit);
+        let connected = connection::connect_with(endpoint, &credentials, limit);
         // The connection keeps the limit by itself; what it took is no longer left for the answer.
         let late =
             |_| ConnectError::Timeout { endpoint: endpoint.clone(), seconds: limit.as_secs_f64() };

@@ -5,7 +5,8 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_proto::endpoint::{ConnectError, Endpoint};
+use osteon_proto::connection::ConnectError;
+use osteon_proto::endpoint::Endpoint;
 use osteon_proto::patience::Patience;
 use osteon_proto::status::{self, Resource};
 use osteon_proto::tls_failure::TlsFailure;

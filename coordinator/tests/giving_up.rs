@@ -15,7 +15,7 @@ use osteon_common::limits::{
 };
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
-use osteon_proto::endpoint::{connect, jobs_client, workers_client};
+use osteon_proto::connection::{connect, jobs_client, workers_client};
 use osteon_proto::v1::attach_request::Message as Sent;
 use osteon_proto::v1::attach_response::Message as Received;
 use osteon_proto::v1::{

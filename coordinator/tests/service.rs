@@ -18,7 +18,8 @@ use osteon_coordinator::store::{
 };
 use osteon_coordinator::{ComponentFailure, Config, Coordinator, Listener, start};
 use osteon_proto::announced::Received;
-use osteon_proto::endpoint::{Endpoint, connect, jobs_client, workers_client};
+use osteon_proto::connection::{connect, jobs_client, workers_client};
+use osteon_proto::endpoint::Endpoint;
 use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;

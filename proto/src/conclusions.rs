@@ -8,16 +8,15 @@ use osteon_common::parameters::{BONE_PARAMETERS, Parameter};
 use osteon_common::posterior::PosteriorDraw;
 
 use crate::choice::PARAMETER;
-use crate::malformed::Malformed;
+use crate::interval::{interval_from_message, interval_to_message};
+use crate::malformed::{Malformed, present};
+use crate::matrix_entry::{entry_number, place};
+use crate::moments::{moments_from_message, moments_to_message};
 use crate::parameter_values::{
     point_from_message, point_to_message, some_from_message, some_to_message,
 };
 use crate::posterior;
-use crate::results::{moments_from_message, moments_to_message};
 use crate::v1;
-
-/// Rows and columns of the elasticity matrix.
-const ROWS: u32 = 6;
 
 /// The fields of a result that hold its conclusions.
 pub(crate) struct ConclusionFields {
@@ -76,14 +75,6 @@ pub(crate) fn from_message(
     })
 }
 
-pub(crate) fn present<T>(value: Option<T>, field: &'static str) -> Result<T, Malformed> {
-    value.ok_or(Malformed::Missing { field })
-}
-
-pub(crate) fn parameter(number: i32) -> Result<Parameter, Malformed> {
-    PARAMETER.required(number, "parameter")
-}
-
 fn sensitivity_to_message(one: &Sensitivity) -> v1::Sensitivity {
     v1::Sensitivity {
         parameter: PARAMETER.number(one.parameter),
@@ -96,7 +87,7 @@ fn sensitivity_to_message(one: &Sensitivity) -> v1::Sensitivity {
 fn sensitivity_from_message(message: &v1::Sensitivity) -> Result<Sensitivity, Malformed> {
     let variation = message.coefficient_of_variation;
     Ok(Sensitivity {
-        parameter: parameter(message.parameter)?,
+        parameter: PARAMETER.required(message.parameter, "parameter")?,
         mean: present(message.mean, "mean")?,
         coefficient_of_variation: present(variation, "coefficient_of_variation")?,
         decay: message.decay,
@@ -133,7 +124,7 @@ fn identified_from_message(
     let free: Vec<Parameter> = sensitivities.iter().map(|one| one.parameter).collect();
     let quantity = |one: &v1::ParameterQuantity| {
         let found = quantity_from_message(one.quantity.as_ref(), "quantity")?;
-        Ok((parameter(one.parameter)?, found))
+        Ok((PARAMETER.required(one.parameter, "parameter")?, found))
     };
     let direction = |one: &v1::Direction| {
         let components = present(one.components.as_ref(), "components")?;
@@ -160,12 +151,10 @@ fn identified_from_message(
 }
 
 fn quantity_to_message(quantity: &DerivedQuantity) -> v1::Quantity {
-    let interval =
-        |[lower, upper]: [f64; 2]| v1::Interval { lower: Some(lower), upper: Some(upper) };
     v1::Quantity {
         value: Some(quantity.value),
         standard_error: quantity.known.map(|known| known.standard_error),
-        interval: quantity.known.map(|known| interval(known.interval)),
+        interval: quantity.known.map(|known| interval_to_message(known.interval)),
         free_share: quantity.known.map(|known| known.free_share),
     }
 }
@@ -187,12 +176,6 @@ fn quantity_from_message(
     Ok(DerivedQuantity { value: present(message.value, "value")?, known })
 }
 
-/// Reads an interval, of which both ends are required.
-pub(crate) fn interval_from_message(message: Option<&v1::Interval>) -> Result<[f64; 2], Malformed> {
-    let message = present(message, "interval")?;
-    Ok([present(message.lower, "lower")?, present(message.upper, "upper")?])
-}
-
 fn profile_to_message(profile: &Profile) -> v1::Profile {
     v1::Profile {
         parameter: PARAMETER.number(profile.parameter),
@@ -207,7 +190,7 @@ fn profile_from_message(message: &v1::Profile) -> Result<Profile, Malformed> {
         return Err(Malformed::WrongLength { field: "costs", found, expected });
     }
     Ok(Profile {
-        parameter: parameter(message.parameter)?,
+        parameter: PARAMETER.required(message.parameter, "parameter")?,
         values: message.values.clone(),
         costs: message.costs.clone(),
     })
@@ -259,7 +242,10 @@ fn solutions_from_message(message: &v1::Solutions) -> Result<Solutions, Malforme
 
 fn spreads_from_message(message: &v1::Solutions) -> Result<Spreads, Malformed> {
     let spread = |one: &v1::ParameterSpread| {
-        Ok((parameter(one.parameter)?, spread_from_message(one.spread.as_ref())?))
+        Ok((
+            PARAMETER.required(one.parameter, "parameter")?,
+            spread_from_message(one.spread.as_ref())?,
+        ))
     };
     let parameters =
         message.parameters.iter().map(spread).collect::<Result<Vec<_>, Malformed>>()?;
@@ -275,19 +261,6 @@ fn spreads_from_message(message: &v1::Solutions) -> Result<Spreads, Malformed> {
     };
     let entries = message.mandel.iter().map(entry).collect::<Result<_, Malformed>>()?;
     Ok(Spreads { parameters, entries })
-}
-
-/// Converts an index that starts at 0 into a row or column number from 1.
-pub(crate) fn entry_number(place: usize) -> u32 {
-    u32::try_from(place + 1).unwrap_or(u32::MAX)
-}
-
-/// Converts a row or column number from `least` to 6 into an index that starts at 0.
-pub(crate) fn place(number: u32, least: u32, field: &'static str) -> Result<usize, Malformed> {
-    let place = (least..=ROWS).contains(&number).then(|| number as usize - 1);
-    let allowed = "it must be 1 to 6, and a column at least its row";
-    let refused = Malformed::OutOfRange { field, value: number.into(), allowed };
-    place.ok_or(refused)
 }
 
 fn spread_to_message(spread: &Spread) -> v1::Spread {

@@ -3,19 +3,16 @@
 use osteon_common::moments::{ConfidenceInterval, MomentIntervals, Outlier};
 use osteon_common::results::DataSummary;
 
-use crate::conclusions::interval_from_message;
+use crate::interval::{interval_from_message, interval_to_message};
 use crate::malformed::Malformed;
-use crate::results::{
+use crate::moments::{
     decay_from_message, decay_to_message, moments_from_message, moments_to_message,
 };
 use crate::v1;
 
 /// Returns the message of a summary.
 pub(crate) fn data_to_message(data: &DataSummary) -> v1::DataSummary {
-    let interval = |ConfidenceInterval { low, high }: ConfidenceInterval| v1::Interval {
-        lower: Some(low),
-        upper: Some(high),
-    };
+    let interval = |found: ConfidenceInterval| interval_to_message([found.low, found.high]);
     v1::DataSummary {
         moments: Some(moments_to_message(&data.moments)),
         count: data.count,

@@ -95,3 +95,8 @@ pub enum Malformed {
     #[error("the specification is not valid: {0}")]
     InvalidSpecification(Violations),
 }
+
+/// Returns the value of a required field.
+pub(crate) fn present<T>(value: Option<T>, field: &'static str) -> Result<T, Malformed> {
+    value.ok_or(Malformed::Missing { field })
+}

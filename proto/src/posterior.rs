@@ -4,8 +4,9 @@ use osteon_common::job::{DRAWS_MAX, POSTERIOR_EVALUATIONS_MAX};
 use osteon_common::parameters::Parameter;
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
 
-use crate::conclusions::{entry_number, parameter, place, present};
-use crate::malformed::Malformed;
+use crate::choice::PARAMETER;
+use crate::malformed::{Malformed, present};
+use crate::matrix_entry::{entry_number, place};
 use crate::parameter_values::{
     point_from_message, point_to_message, some_from_message, some_to_message,
 };
@@ -15,7 +16,7 @@ use crate::v1;
 pub(crate) fn to_message(posterior: &Posterior) -> v1::Posterior {
     let Posterior { free, parameters, correlation, entries, .. } = posterior;
     let parameters = free.iter().zip(parameters).map(|(parameter, summary)| {
-        let parameter = crate::choice::PARAMETER.number(*parameter);
+        let parameter = PARAMETER.number(*parameter);
         v1::ParameterPosterior { parameter, posterior: Some(summary_to_message(summary)) }
     });
     let entries = entries.iter().map(|(row, column, summary)| v1::EntryPosterior {
@@ -56,7 +57,10 @@ pub(crate) fn from_message(
 ) -> Result<Posterior, Malformed> {
     counts(message, draws.len())?;
     let of_parameter = |one: &v1::ParameterPosterior| {
-        Ok((parameter(one.parameter)?, summary(one.posterior.as_ref(), "posterior")?))
+        Ok((
+            PARAMETER.required(one.parameter, "parameter")?,
+            summary(one.posterior.as_ref(), "posterior")?,
+        ))
     };
     let known: Vec<(Parameter, PosteriorSummary)> =
         message.parameters.iter().map(of_parameter).collect::<Result<_, Malformed>>()?;

@@ -7,8 +7,8 @@ use osteon_common::moments::KolmogorovTest;
 use osteon_common::outcome::{FailureCounts, FailureKind, Outcome};
 use osteon_common::posterior::PosteriorDraw;
 use osteon_common::results::{
-    BestPoint, DecayEstimate, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupEnding,
-    GroupResult, Integrity, JobResult, Moments,
+    BestPoint, Estimate, EstimatedError, Evaluation, EvaluationRole, GroupEnding, GroupResult,
+    Integrity, JobResult,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Picking, SolverSettings};
@@ -21,6 +21,9 @@ use crate::choice::{
 use crate::conclusions::{self, FieldsOf};
 use crate::data_summary::{data_from_message, data_to_message};
 use crate::malformed::Malformed;
+use crate::moments::{
+    decay_from_message, decay_to_message, moments_from_message, moments_to_message,
+};
 use crate::parameter_values::{point_from_message, point_to_message};
 use crate::setup;
 use crate::specification::{search_from_message, search_to_message};
@@ -338,14 +341,6 @@ fn nominal_from_message(message: v1::NominalSampling) -> NominalSampling {
     NominalSampling { band, period, pairs }
 }
 
-pub(crate) fn moments_to_message(moments: &Moments) -> v1::Moments {
-    v1::Moments { mean: moments.mean, coefficient_of_variation: moments.coefficient_of_variation }
-}
-
-pub(crate) fn moments_from_message(message: &v1::Moments) -> Moments {
-    Moments { mean: message.mean, coefficient_of_variation: message.coefficient_of_variation }
-}
-
 fn estimate_to_message(estimate: &Estimate) -> v1::Estimate {
     v1::Estimate {
         moments: Some(moments_to_message(&estimate.moments)),
@@ -363,16 +358,6 @@ fn estimate_from_message(message: &v1::Estimate) -> Result<Estimate, Malformed> 
         standard_error: moments_from_message(standard_error),
         controlled: message.controlled,
     })
-}
-
-pub(crate) fn decay_to_message(decay: DecayEstimate) -> v1::DecayEstimate {
-    let DecayEstimate { mean, standard_deviation, standard_error } = decay;
-    v1::DecayEstimate { mean, standard_deviation, standard_error }
-}
-
-pub(crate) fn decay_from_message(message: v1::DecayEstimate) -> DecayEstimate {
-    let v1::DecayEstimate { mean, standard_deviation, standard_error } = message;
-    DecayEstimate { mean, standard_deviation, standard_error }
 }
 
 fn test_to_message(test: KolmogorovTest) -> v1::KolmogorovTest {

@@ -6,6 +6,7 @@ use osteon_common::parameters::Parameter;
 use osteon_common::results::{DataSummary, Evaluation};
 use osteon_files::report::{Moment, MomentIntervals, Moments};
 
+use crate::figure_names::{prefix, suffix};
 use crate::finding::Finding;
 
 /// Most rows of a job that is followed; then every second one is dropped.
@@ -151,14 +152,4 @@ impl SearchCourse {
         };
         self.rows.iter().map(|row| row.moments[place]).collect()
     }
-}
-
-/// Returns the beginning of the names of a group's figures.
-pub(crate) fn prefix(group: Option<&str>, set: usize) -> String {
-    group.map_or_else(String::new, |_| format!("group-{}-", set + 1))
-}
-
-/// Returns the end of the titles of a group's figures.
-pub(crate) fn suffix(group: Option<&str>) -> String {
-    group.map_or_else(String::new, |name| format!(", group {name}"))
 }

@@ -3,6 +3,7 @@
 mod comparison;
 pub(crate) mod convergence;
 pub(crate) mod failures;
+mod figure;
 mod groups;
 mod moments;
 mod posterior;
@@ -13,22 +14,13 @@ mod solutions;
 mod traces;
 mod velocities;
 
-use crate::chart::Chart;
 use crate::finding::Finding;
 
 pub(crate) use comparison::overlay;
+pub(crate) use figure::Figure;
 pub(crate) use groups::forest;
 pub(crate) use setup::of_setup;
 pub(crate) use traces::of_traces;
-
-/// A chart, and how to read it.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Figure {
-    /// The chart.
-    pub(crate) chart: Chart,
-    /// Two sentences on how to read it.
-    pub(crate) reading: String,
-}
 
 /// Figures under a heading.
 #[derive(Debug, Clone, PartialEq)]

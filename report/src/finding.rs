@@ -12,7 +12,7 @@ use osteon_files::report::{
     PosteriorReport, Propagation, Solutions, Solver, Velocity,
 };
 
-use crate::course;
+use crate::figure_names;
 use crate::input::{JobContext, ModelOutcomes};
 use crate::sample::VelocitySample;
 
@@ -230,12 +230,12 @@ impl<'a> Finding<'a> {
 
     /// Returns the beginning of the names of its figures.
     pub(crate) fn prefix(&self) -> String {
-        course::prefix(self.group, self.set)
+        figure_names::prefix(self.group, self.set)
     }
 
     /// Returns the end of the titles of its figures.
     pub(crate) fn suffix(&self) -> String {
-        course::suffix(self.group)
+        figure_names::suffix(self.group)
     }
 }
 

@@ -8,6 +8,7 @@
 
 mod chart;
 mod course;
+mod figure_names;
 mod figures;
 mod finding;
 mod input;

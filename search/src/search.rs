@@ -15,7 +15,7 @@ use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::results::{
     BestPoint, DataSummary, EstimatedError, Evaluation, EvaluationRole, GroupEnding, GroupResult,
-    JobFailure, JobResult, Status,
+    JobResult, Status,
 };
 use osteon_common::sampling::NominalSampling;
 use osteon_common::statistics::{self, PointStatistics, likelihood_error};
@@ -27,11 +27,13 @@ use crate::posterior::posterior;
 
 pub use self::branch::Branch;
 pub use self::candidates::same_point;
+pub use self::ending::Ending;
 
 mod advice;
 mod branch;
 mod candidates;
 mod dataset_search;
+mod ending;
 mod identification;
 mod method;
 mod reasons;
@@ -45,25 +47,6 @@ pub enum Step {
     Evaluate(Point),
     /// The search has ended.
     Done(Ending),
-}
-
-/// Ending of a job.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Ending {
-    /// Final status of the job.
-    pub status: Status,
-    /// Kind of the failure; `None` unless the status is failed.
-    pub failure: Option<JobFailure>,
-    /// Reason as a sentence, where the status needs one.
-    pub reason: Option<String>,
-}
-
-impl Ending {
-    /// Creates the ending of a search, which fails only if no point is feasible.
-    pub fn from_search(status: Status, reason: Option<String>) -> Self {
-        let failure = (status == Status::Failed).then_some(JobFailure::NoFeasiblePoint);
-        Self { status, failure, reason }
-    }
 }
 
 /// Summary of a search path, without the outcomes.

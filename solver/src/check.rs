@@ -7,8 +7,10 @@ use osteon_common::limits::REFINEMENT_MAX;
 use osteon_common::settings::{Method, SolverSettings};
 
 pub use self::difference::{Difference, difference, error_max};
+use crate::arrival::Arrival;
+use crate::failure::Failure;
 use crate::isa::Isa;
-use crate::solver::{Arrival, Failure, Solver, Workspace};
+use crate::solver::{Solver, Workspace};
 
 /// Factor of the reference's refinement to the case's.
 const REFERENCE: f64 = 5.0;

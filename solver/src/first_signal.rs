@@ -7,8 +7,10 @@ use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::Ensemble;
 use osteon_common::settings::{Extremum, Picking};
 
+use crate::arrival::Arrival;
+use crate::failure::Failure;
 use crate::picking::{mean, slope};
-use crate::solver::{Arrival, Failure, Solver, Workspace};
+use crate::solver::{Solver, Workspace};
 
 /// Decibels per neper: 20/ln 10.
 const DECIBELS: f64 = 20.0 / LN_10;

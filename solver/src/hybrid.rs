@@ -52,11 +52,11 @@ use self::march::MarchWorkspace;
 use self::passes::Passes;
 use self::plan::WorkBudget;
 use self::scope::Scope;
+use crate::arrival::Arrival;
+use crate::failure::{Failure, check_direct_wave, speed_not_finite};
 use crate::isa::Isa;
 use crate::medium::Medium;
 use crate::picking::Window;
-use crate::solver::{check_direct_wave, speed_not_finite};
-use crate::{Arrival, Failure};
 
 /// Solves cases of one setup by the hybrid method.
 #[derive(Debug)]

@@ -15,9 +15,11 @@
 
 #![expect(clippy::needless_range_loop, reason = "matrix indices read as in the formulas")]
 
+mod arrival;
 pub mod check;
 mod complex;
 mod exact;
+mod failure;
 mod first_signal;
 pub mod hybrid;
 mod isa;
@@ -29,6 +31,7 @@ mod quadrature;
 mod solver;
 mod vector;
 
+pub use arrival::{Arrival, PassSummary, Sampled};
 pub use complex::Complex;
 pub use exact::guided::{GuidedWave, GuidedWaves};
 #[cfg(feature = "measure")]
@@ -36,7 +39,8 @@ pub use exact::quantities::{admittance, fastest_wave};
 #[cfg(feature = "measure")]
 pub use exact::stages;
 pub use exact::traces::{TraceError, Traces};
+pub use failure::Failure;
 pub use first_signal::{FirstSignal, ObservedRealization};
 pub use hybrid::{Hybrid, HybridWorkspace};
 pub use isa::{Isa, UnknownIsa};
-pub use solver::{Arrival, Failure, PassSummary, Sampled, Solver, Workspace};
+pub use solver::{Solver, Workspace};

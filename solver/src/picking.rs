@@ -4,7 +4,7 @@
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::{self, Picking};
 
-use crate::Failure;
+use crate::failure::Failure;
 
 /// An extremum below this fraction of the window's largest one is numerical noise.
 pub(crate) const FLOOR: f64 = 1e-3;

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use osteon_common::case::{Bone, Setup};
 use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
 use osteon_common::realization::Ensemble;
-use osteon_common::sampling;
 use osteon_common::settings::Method;
 
+use crate::arrival::Arrival;
 use crate::exact::pass::ExactWorkspace;
-use crate::exact::table_cache::TableMemory;
+use crate::exact::table_memory::TableMemory;
 use crate::exact::{Exact, has_tables_of};
+use crate::failure::Failure;
 use crate::hybrid::{Hybrid, HybridWorkspace};
 use crate::isa::Isa;
 
@@ -31,77 +32,6 @@ pub struct Solver {
 pub struct Workspace {
     exact: ExactWorkspace,
     hybrid: HybridWorkspace,
-}
-
-/// A picked first arrival.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Arrival {
-    /// Velocity of the first arriving signal, m/s; of a bidirectional probe the harmonic mean of both
-    /// directions.
-    pub velocity: f64,
-    /// Velocities from the first source and from the second, m/s, of a bidirectional probe.
-    pub directions: Option<[f64; 2]>,
-    /// Time of the picked extremum at each receiver, s, from the first source.
-    pub times: Vec<f64>,
-    /// Modulus of its pressure there, Pa, for a pulse of any one amplitude: only ratios mean something.
-    pub amplitudes: Vec<f64>,
-    /// Estimate of the velocity's relative error by discretisation, ≥ 0.
-    pub estimated_error: f64,
-    /// Sampling of the exact method; `None` for the hybrid method, whose discretisation is in the
-    /// setup.
-    pub passes: Option<PassSummary>,
-}
-
-/// Sampling of the exact method for one bone.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PassSummary {
-    /// Number of passes.
-    pub count: u32,
-    /// Total number of (frequency, wavenumber) pairs computed.
-    pub pairs_computed: u64,
-    /// Sampling of the last pass that contributed.
-    pub last: Sampled,
-}
-
-/// Sampling of one pass.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sampled {
-    /// Highest frequency, Hz.
-    pub band: f64,
-    /// Time after which the signal repeats, s.
-    pub period: f64,
-    /// (Frequency, wavenumber) pairs.
-    pub pairs: u64,
-}
-
-/// Reason why a case has no velocity.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Failure {
-    /// Its kind.
-    pub kind: FailureKind,
-    /// Description as a sentence, which names the receiver where there is one.
-    pub detail: String,
-}
-
-impl Arrival {
-    /// Combines the arrivals of both directions. Both errors may have the same sign.
-    fn with(self, other: &Self) -> Self {
-        let [one, two] = [self.velocity, other.velocity];
-        let passes = self.passes.zip(other.passes).map(|(one, two)| PassSummary {
-            count: one.count + two.count,
-            pairs_computed: one.pairs_computed + two.pairs_computed,
-            last: one.last,
-        });
-        // The slownesses weigh the errors.
-        let error = (self.estimated_error * two + other.estimated_error * one) / (one + two);
-        Self {
-            velocity: 2.0 / (1.0 / one + 1.0 / two),
-            directions: Some([one, two]),
-            estimated_error: error,
-            passes,
-            ..self
-        }
-    }
 }
 
 impl Solver {
@@ -242,72 +172,5 @@ impl Solver {
             None => self.arrival(&bone, workspace),
         };
         arrival.map_err(|failure| failure.kind)
-    }
-}
-
-/// Refuses, before anything is computed, bones through which no wave can arrive first; `speed`
-/// (m/s) is an upper bound of the speed of every wave.
-pub(crate) fn check_direct_wave(setup: &Setup, speed: f64) -> Result<(), Failure> {
-    for (r, place) in setup.probe.places().enumerate() {
-        let x = place.x;
-        let earliest = sampling::earliest_arrival(setup, place, speed);
-        let direct = sampling::direct_arrival(setup, place);
-        if earliest >= direct {
-            return Err(Failure {
-                kind: FailureKind::DirectWaveFirst,
-                detail: format!(
-                    "at receiver {} ({x:?} m from the source) the direct wave arrives at {} µs, a wave \
-                     through the bone not before {} µs",
-                    r + 1,
-                    readable(direct * 1e6),
-                    readable(earliest * 1e6)
-                ),
-            });
-        }
-    }
-    Ok(())
-}
-
-/// Formats a number for a sentence: three decimals, or an exponent if these would all be zero.
-pub(crate) fn readable(value: f64) -> String {
-    if (1e-2..1e6).contains(&value.abs()) { format!("{value:.3}") } else { format!("{value:.3e}") }
-}
-
-/// Advice if a pressure is not finite.
-pub(crate) const OUT_OF_SCALE: &str =
-    "a number of layers, probe, density or elasticity is out of scale";
-
-/// Returns the failure of a bone whose waves have no finite speed.
-pub(crate) fn speed_not_finite() -> Failure {
-    Failure {
-        kind: FailureKind::NotFinite,
-        detail: "the bone's wave speeds came out as NaN or infinite; density or elasticity is out of scale"
-            .to_owned(),
-    }
-}
-
-/// Returns the failure of a case whose pressure is not finite.
-pub(crate) fn pressure_not_finite() -> Failure {
-    Failure {
-        kind: FailureKind::NotFinite,
-        detail: format!("the pressure came out as NaN or infinite; {OUT_OF_SCALE}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_in_sentences_are_short() {
-        for (value, expected) in [
-            (14.26666, "14.267"),
-            (-0.05, "-0.050"),
-            (1e300, "1.000e300"),
-            (6.7e-16, "6.700e-16"),
-            (f64::INFINITY, "inf"),
-        ] {
-            assert_eq!(readable(value), expected);
-        }
     }
 }

@@ -1,6 +1,7 @@
 //! Calibration of posteriors: how often their intervals contain the parameters that made the data,
 //! and where these lie among the draws.
 
+mod calibration;
 mod data;
 mod ranks;
 pub mod reference;
@@ -18,10 +19,9 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorSummary};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::statistics::PointStatistics;
-use osteon_solver::Isa;
 use rayon::prelude::*;
 
-pub use self::data::Scenario;
+pub use self::calibration::{PosteriorCalibration, Scenario};
 use self::data::simulated;
 use self::ranks::Ranks;
 use crate::identify::{RealizationCache, identify, outcomes};
@@ -44,23 +44,6 @@ const FAILED_MAX: f64 = 0.1;
 const MANY: u64 = 500;
 /// Quantities of a posterior: the seven parameters and √(c1111/ρ).
 const QUANTITIES: usize = 8;
-
-/// Data sets whose posteriors are computed.
-#[derive(Debug, Clone, Copy)]
-pub struct PosteriorCalibration {
-    /// How the velocities are made.
-    pub scenario: Scenario,
-    /// Number of velocities of each data set.
-    pub velocities: u64,
-    /// Number of the first parameter set, to continue an earlier table.
-    pub first: u64,
-    /// Number of parameter sets.
-    pub repetitions: u64,
-    /// Seed of the parameter sets, the data and the germs.
-    pub seed: u64,
-    /// Instruction set, which affects only the time.
-    pub isa: Isa,
-}
 
 /// Counts of one quantity over data sets.
 #[derive(Debug, Clone, Copy, Default)]

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use osteon_common::job::JobKind;
 use osteon_common::limits::MESSAGE_BYTES_MAX;
-use osteon_proto::endpoint::connect;
+use osteon_proto::connection::connect;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{CancelRequest, JobSnapshot, SubmitRequest, WatchRequest};
 use tonic::Code;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use osteon_common::job::JobKind;
 use osteon_files::job_file;
-use osteon_proto::endpoint::{connect, jobs_client};
+use osteon_proto::connection::{connect, jobs_client};
 use osteon_proto::specification;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;

@@ -8,7 +8,7 @@ use osteon_common::realization::Ensemble;
 use osteon_common::version;
 use osteon_proto::announced::Received;
 use osteon_proto::batch::{self, Work};
-use osteon_proto::endpoint::{connect, workers_client};
+use osteon_proto::connection::{connect, workers_client};
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::{AttachRequest, AttachResponse, Heartbeat, WorkerHello};

@@ -7,8 +7,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use osteon_common::limits::{NAME_BYTES_MAX, WORKER_THREADS_MAX};
+use osteon_proto::connection::{self, ConnectError, Connection};
 use osteon_proto::credentials::Credentials;
-use osteon_proto::endpoint::{self, ConnectError, Connection, Endpoint};
+use osteon_proto::endpoint::Endpoint;
 use osteon_proto::identity;
 use osteon_proto::spans::SpanRecorder;
 use osteon_proto::status::{is_banned, retry_after};
@@ -392,7 +393,7 @@ enum OpenError {
 
 async fn connect(endpoint: &Endpoint, credentials: &Credentials) -> Result<Connection, OpenError> {
     let limit = Duration::from_secs(ATTACH_S_MAX);
-    let connected = endpoint::connect_with(endpoint, credentials, limit).await;
+    let connected = connection::connect_with(endpoint, credentials, limit).await;
     connected.map_err(|error| match error {
         ConnectError::Tls { failure, .. } => OpenError::Distrust(failure),
         other => OpenError::Unreachable(other.to_string()),
@@ -410,7 +411,7 @@ async fn open(
     let unanswered = || OpenError::Unreachable("the coordinator does not answer".to_owned());
     // The outbox is empty, so the hello always fits.
     outbox.try_send(AttachRequest { message: Some(hello) }).map_err(|_| unanswered())?;
-    let mut client = endpoint::workers_client(connected?);
+    let mut client = connection::workers_client(connected?);
     match timeout(limit, client.attach(ReceiverStream::new(requests))).await {
         Ok(Ok(response)) => Ok(response.into_inner()),
         Ok(Err(status)) => Err(OpenError::Status(status)),

@@ -7,7 +7,10 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, installed, programs, root, say};
+use crate::places::{programs, root};
+use crate::process::cargo;
+use crate::terminal::say;
+use crate::tools::installed;
 
 /// The version of mdBook that builds the book.
 const VERSION: &str = "0.5.4";

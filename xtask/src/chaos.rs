@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, cargo_command};
+use crate::process::{cargo, cargo_command};
 
 const USAGE: &str = "usage: cargo xtask chaos [--kills N] [--seed S]";
 /// Default number of kills of the coordinator, and of workers.

@@ -7,7 +7,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{announce, cargo, installed, root};
+use crate::places::root;
+use crate::process::cargo;
+use crate::terminal::announce;
+use crate::tools::installed;
 
 /// The version of cargo-deny for which the rules are written.
 const VERSION: &str = "0.20.2";

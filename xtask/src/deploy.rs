@@ -7,7 +7,9 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result};
 
-use crate::{cargo, cargo_command, installed, programs, root};
+use crate::places::{programs, root};
+use crate::process::{cargo, cargo_command};
+use crate::tools::installed;
 
 /// The version of cargo-deb that builds the package.
 const CARGO_DEB: &str = "3.8.0";

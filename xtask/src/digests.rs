@@ -8,7 +8,8 @@ use std::process::Command;
 
 use anyhow::{Result, bail};
 
-use crate::{cargo, cargo_command, output, say};
+use crate::process::{cargo, cargo_command, output};
+use crate::terminal::say;
 
 /// The study that prints digests.
 const STUDY: &str = "digest";

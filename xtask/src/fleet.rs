@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use crate::{cargo, cargo_command};
+use crate::process::{cargo, cargo_command};
 
 /// The benchmark, which checks the words itself.
 const BENCH: [&str; 6] = ["bench", "--package", "osteon", "--bench", "fleet", "--"];

@@ -11,20 +11,24 @@ mod fleet;
 mod manual;
 mod metrics;
 mod peers;
+mod places;
+mod process;
 mod python;
 mod random;
 mod reference;
 mod report;
 mod slurm;
 mod tables;
+mod terminal;
+mod tools;
 mod umbridge;
 
 use std::env;
-use std::io::{self, Write as _};
-use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, bail};
+
+use crate::process::{cargo, cargo_command};
 
 /// A cargo invocation.
 type Cargo = &'static [&'static str];
@@ -258,75 +262,4 @@ fn perform(name: &str, words: &[String]) -> Result<()> {
 
 fn list() -> String {
     TASKS.iter().map(|(name, what, _)| format!("  {name:11} {what}\n")).collect()
-}
-
-/// Creates a cargo command with these arguments, at the root of the workspace.
-fn cargo_command(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO"));
-    command.args(arguments).current_dir(root());
-    command
-}
-
-/// Runs a program, and fails if it fails.
-fn cargo(command: &mut Command) -> Result<()> {
-    announce(command);
-    let status = command.status().with_context(|| format!("cannot run {command:?}"))?;
-    if !status.success() {
-        bail!("{command:?} failed");
-    }
-    Ok(())
-}
-
-/// Runs a program and returns its output.
-fn output(command: &mut Command) -> Result<String> {
-    announce(command);
-    let output = command
-        .stderr(Stdio::inherit())
-        .output()
-        .with_context(|| format!("cannot run {command:?}"))?;
-    if !output.status.success() {
-        bail!("{command:?} failed");
-    }
-    String::from_utf8(output.stdout).with_context(|| format!("{command:?} prints no text"))
-}
-
-fn announce(command: &Command) {
-    let words: Vec<_> = command.get_args().map(|word| word.to_string_lossy()).collect();
-    eprintln!("+ {} {}", command.get_program().to_string_lossy(), words.join(" "));
-}
-
-/// Prints a line on stdout.
-fn say(text: &str) -> Result<()> {
-    writeln!(io::stdout(), "{text}").context("cannot write to stdout")
-}
-
-/// Returns the directory where cargo puts programs, including this one; its parent is the target
-/// directory.
-fn programs() -> Result<PathBuf> {
-    let here = env::current_exe().context("cannot tell where xtask is")?;
-    Ok(here.parent().context("xtask has no directory")?.to_owned())
-}
-
-/// Returns the path of a program of crates.io of this version, which is installed below the target
-/// directory, with these options of `cargo install`, unless it is there.
-fn installed(name: &str, version: &str, options: &[&str]) -> Result<PathBuf> {
-    let tools = programs()?.with_file_name("tools");
-    let program = tools.join("bin").join(name);
-    let present = Command::new(&program).arg("--version").output().is_ok_and(|output| {
-        let text = String::from_utf8_lossy(&output.stdout);
-        // Some print `name 1.2.3`, others `name v1.2.3`.
-        let last = text.trim().split(' ').next_back().unwrap_or_default();
-        last.strip_prefix('v').unwrap_or(last) == version
-    });
-    if !present {
-        let install = ["install", name, "--version", version, "--locked", "--force", "--root"];
-        cargo(cargo_command(&install).arg(&tools).args(options))?;
-    }
-    Ok(program)
-}
-
-/// Returns the root of the workspace.
-fn root() -> &'static Path {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    here.parent().unwrap_or(here)
 }

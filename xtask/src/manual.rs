@@ -4,7 +4,8 @@ use std::fs;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, cargo_command, output, programs};
+use crate::places::programs;
+use crate::process::{cargo, cargo_command, output};
 
 /// Shells whose completions are packaged, and the names of their scripts.
 const SHELLS: [(&str, &str); 3] =

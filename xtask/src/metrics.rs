@@ -7,7 +7,8 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, cargo_command, programs, root};
+use crate::places::{programs, root};
+use crate::process::{cargo, cargo_command};
 
 /// `cargo xtask metrics`.
 pub(crate) fn check(words: &[String]) -> Result<()> {

@@ -6,7 +6,8 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result};
 
-use crate::{cargo, cargo_command, output, programs, root};
+use crate::places::{programs, root};
+use crate::process::{cargo, cargo_command, output};
 
 /// Builds the benchmark of fleets, and runs `benches/peers/run.py` with `words`. Uses `python3`, or
 /// the interpreter named by the variable `PYTHON`.

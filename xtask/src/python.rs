@@ -8,7 +8,8 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, cargo_command, output, programs, root};
+use crate::places::{programs, root};
+use crate::process::{cargo, cargo_command, output};
 
 /// What both need, for the message of a failure.
 const NEEDS: &str = "the tests in Python need Python 3.10 or later (notebooks and pools: 3.11) with its module \

@@ -4,7 +4,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, cargo_command, say};
+use crate::process::{cargo, cargo_command};
+use crate::terminal::say;
 
 const USAGE: &str = "usage: cargo xtask random [--minutes M] [--seed S]";
 /// Default duration, minutes.

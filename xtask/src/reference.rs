@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use crate::{cargo, cargo_command};
+use crate::process::{cargo, cargo_command};
 
 /// Writes the tables of docs/job-files.md, docs/cli.md, docs/grpc-reference.md, the JSON Schemas, and the
 /// types of the sections in Python, by the tests that compare them.

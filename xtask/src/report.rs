@@ -4,7 +4,8 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, cargo_command, programs, root};
+use crate::places::{programs, root};
+use crate::process::{cargo, cargo_command};
 
 /// Names of the browser, as Debian and others install it.
 const BROWSERS: [&str; 2] = ["chromium", "chromium-browser"];

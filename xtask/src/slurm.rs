@@ -7,7 +7,9 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result};
 
-use crate::{cargo, cargo_command, programs, root, say};
+use crate::places::{programs, root};
+use crate::process::{cargo, cargo_command};
+use crate::terminal::say;
 
 /// Word by which the tests are skipped where there is no Slurm.
 pub(crate) const IF_INSTALLED: &str = "--if-installed";

@@ -13,7 +13,8 @@ use std::fs;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo_command, output, root};
+use crate::places::root;
+use crate::process::{cargo_command, output};
 
 const PAGE: &str = "docs/validation.md";
 const START: &str = "<!-- table: ";

@@ -2,7 +2,9 @@
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{cargo, cargo_command, programs, python};
+use crate::places::programs;
+use crate::process::{cargo, cargo_command};
+use crate::python;
 
 /// `cargo xtask umbridge`.
 pub(crate) fn test(words: &[String]) -> Result<()> {

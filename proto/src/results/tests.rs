@@ -13,7 +13,7 @@ use osteon_common::job::{Prior, Sampling, SearchMethod};
 use osteon_common::moments::{ConfidenceInterval, MomentIntervals, Outlier};
 use osteon_common::parameters::{AS_IN_SETUP, BONE_PARAMETERS, Parameter, Point};
 use osteon_common::results::{
-    DataSummary, DecayEstimate, Integrity, JobFailure, PointMeaning, Status,
+    DataSummary, DecayEstimate, Integrity, JobFailure, Moments, PointMeaning, Status,
 };
 
 /// Any number, including both zeros, infinities and subnormal numbers.

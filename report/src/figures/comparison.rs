@@ -1,6 +1,6 @@
 //! Several runs in one figure.
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::sample::VelocitySample;
 

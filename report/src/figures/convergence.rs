@@ -2,7 +2,7 @@
 
 use osteon_files::report::Moment;
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::course::SearchCourse;
 use crate::finding::Finding;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use osteon_common::outcome::FailureKind;
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::quantity;

@@ -1,6 +1,6 @@
 //! Groups of the data as forest plots.
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 

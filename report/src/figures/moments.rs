@@ -3,7 +3,7 @@
 use osteon_common::job::Sampling;
 use osteon_files::report::Moment;
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::sample::{NORMAL_95, Running};

@@ -2,7 +2,7 @@
 
 use osteon_common::parameters::Parameter;
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::quantity::{symbol, unit, words};

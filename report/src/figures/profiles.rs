@@ -1,6 +1,6 @@
 //! Profiles: the lowest cost with one parameter held.
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::quantity::{symbol, unit, words};

@@ -1,6 +1,6 @@
 //! Velocities in the order of their indices (the paper, Fig. 4).
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::sample::VelocitySample;

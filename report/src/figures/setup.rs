@@ -2,7 +2,7 @@
 
 use osteon_common::case::Setup;
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::quantity::{LENGTH, Precision};
 

@@ -1,6 +1,6 @@
 //! Solutions from several starts as parallel coordinates.
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::quantity::{symbol, words};

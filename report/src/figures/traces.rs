@@ -2,7 +2,7 @@
 
 use osteon_files::report::Simulation;
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::input::SimulationContext;
 use crate::quantity::{LENGTH, Precision, TIME, VELOCITY};

@@ -1,6 +1,6 @@
 //! Distributions of measured and model velocities (the paper, Figs. 5 to 7).
 
-use super::Figure;
+use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::number::digits;

@@ -7,8 +7,8 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
 use osteon_common::results::{BestPoint, Moments};
 
-use super::population::{Member, Population, moments as moments_of};
-use super::{PosteriorProblem, PosteriorSearch, SearchOutcome};
+use super::batches::{PosteriorSearch, SearchOutcome};
+use super::population::{Member, Population, PosteriorProblem, closed_form, moments as moments_of};
 
 /// Sobol' points of the population that the result summarises, with up to two free parameters and
 /// with more. The former are so many that quantiles, too, are exact to a thousandth of a standard
@@ -27,7 +27,7 @@ impl PosteriorSearch {
         specification: &JobSpecification,
         errors: [f64; 2],
     ) -> Option<Posterior> {
-        let problem = self.problem.as_ref().filter(|_| self.pending.is_empty())?;
+        let problem = self.problem.as_ref().filter(|_| self.point().is_none())?;
         let problem = &problem.with_model_errors(errors);
         let population = self.final_population(problem);
         if population.members.is_empty() {
@@ -60,7 +60,7 @@ impl PosteriorSearch {
             mean,
             coefficient_of_variation: variation,
             bulk_velocity: of(&|point| {
-                super::closed_form(point).map_or(f64::NAN, |closed| libm::exp(closed[0]))
+                closed_form(point).map_or(f64::NAN, |closed| libm::exp(closed[0]))
             }),
             entries: entries(&population, &prior),
             predictive_p_value: None,

@@ -9,6 +9,7 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{Evaluation, EvaluationRole, GroupEnding, Moments, Status};
 use osteon_common::statistics::{PointStatistics, decay_estimate, estimate, likelihood_cost};
 
+use super::ending::Ending;
 use super::method::MethodState;
 use super::reasons;
 use crate::posterior::{PosteriorSearch, feasible_moments, likelihood};
@@ -393,7 +394,7 @@ impl DatasetSearch {
         };
         // Always set before the end.
         let stop = self.stop.unwrap_or(StopReason::Converged);
-        let super::Ending { status, reason, .. } = reasons::ending(stop, &evidence, specification);
+        let Ending { status, reason, .. } = reasons::ending(stop, &evidence, specification);
         let best = self.best().map(|row| row.number);
         self.ending = Some(GroupEnding { status, reason, best });
     }

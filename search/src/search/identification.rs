@@ -6,8 +6,8 @@ use osteon_common::parameters::Point;
 use osteon_common::results::{Evaluation, GroupEnding, Status};
 use osteon_common::statistics::PointStatistics;
 
-use super::Ending;
 use super::dataset_search::DatasetSearch;
+use super::ending::Ending;
 
 /// State of an identification.
 #[derive(Debug, Clone)]

@@ -5,8 +5,8 @@ use osteon_common::job::{JobSpecification, Objective, Range, Search};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{Evaluation, Status};
 
-use super::Ending;
 use super::advice as failure_advice;
+use super::ending::Ending;
 use crate::posterior::{SearchOutcome, closed_form};
 use crate::proposal::StopReason;
 use crate::search_box::{SearchBox, Side};

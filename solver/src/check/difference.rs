@@ -2,7 +2,8 @@
 
 use osteon_common::case::Setup;
 
-use crate::solver::{Arrival, Failure};
+use crate::arrival::Arrival;
+use crate::failure::Failure;
 
 /// Picked times further apart than this, in periods of the centre frequency, belong to different
 /// extrema: neighbouring extrema are about half a period apart, and discretisation moves one by a

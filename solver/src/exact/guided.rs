@@ -19,7 +19,7 @@ use osteon_common::case::Bone;
 
 use crate::complex::Complex;
 use crate::exact::plate::{AccuratePlate, Layer, Symmetric};
-use crate::exact::{FillPlate, Solid};
+use crate::exact::tensor::{FillPlate, Solid};
 use crate::isa::{Isa, Kernel};
 use crate::lanes::Lanes;
 use crate::medium::Medium;

@@ -8,21 +8,26 @@
 use std::sync::Arc;
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::sampling::{self, Grade, SPEED_BINS};
+use osteon_common::sampling::{self, Grade, OuterFaces, SPEED_BINS};
 
-use crate::exact::Exact;
-use crate::exact::pass::{Band, ExactWorkspace};
+use crate::arrival::Arrival;
+use crate::exact::bin_tables::Band;
+use crate::exact::grade_caches::GradeCaches;
+use crate::exact::pass::{self, ExactWorkspace};
+use crate::exact::prepared_setup::PreparedSetup;
 use crate::exact::response::respond;
-use crate::exact::table_cache::{TableMemory, TablesRef};
+use crate::exact::table_cache::TablesRef;
+use crate::exact::table_memory::TableMemory;
+use crate::failure::Failure;
 use crate::isa::Isa;
 use crate::lanes::ComplexLanes;
 use crate::medium::Medium;
-use crate::solver::{Arrival, Failure};
 
 /// The exact method for one setup.
 #[derive(Debug)]
 pub struct Stages {
-    exact: Exact,
+    prepared: PreparedSetup,
+    caches: GradeCaches,
 }
 
 /// Scratch memory of one thread.
@@ -36,7 +41,7 @@ pub struct StageWorkspace {
 /// A bone whose tensor has been converted into the common part of its plate's admittances.
 #[derive(Debug)]
 pub struct Filled<'a> {
-    exact: &'a Exact,
+    prepared: &'a PreparedSetup,
     bin: TablesRef<'a>,
     accurate: bool,
     medium: Medium,
@@ -60,7 +65,9 @@ impl Stages {
     /// Creates the stages for cases of `setup`, which has passed validation, on one instruction
     /// set.
     pub fn new(setup: &Setup, isa: Isa) -> Self {
-        Self { exact: Exact::new(setup, isa, &Arc::new(TableMemory::default())) }
+        let memory = Arc::new(TableMemory::default());
+        let caches = GradeCaches::new(setup, OuterFaces::None, &memory);
+        Self { prepared: PreparedSetup::new(setup, isa), caches }
     }
 
     /// Tensor: computes the common part of the admittances of one bone.
@@ -72,19 +79,18 @@ impl Stages {
         bone: &Bone,
         memory: &'a mut StageWorkspace,
     ) -> Result<Filled<'a>, Failure> {
-        let exact = &self.exact;
-        let accurate = sampling::first_grade(&exact.setup) == Grade::Thorough;
-        let (medium, speed) = exact.solid(bone)?;
+        let Self { prepared, caches } = self;
+        let accurate = sampling::first_grade(&prepared.setup) == Grade::Thorough;
+        let (medium, speed) = prepared.solid(bone)?;
         if accurate {
-            exact.fill_plate(&medium, &mut memory.exact.accurate);
+            prepared.fill_plate(&medium, &mut memory.exact.accurate);
         } else {
-            exact.fill_plate(&medium, &mut memory.exact.fast);
+            prepared.fill_plate(&medium, &mut memory.exact.fast);
         }
-        let caches = &exact.without_faces;
         let cache = if accurate { &caches.thorough } else { &caches.quick };
-        let index = sampling::speed_bin(&exact.setup, speed).unwrap_or(SPEED_BINS);
-        let bin = exact.bin_tables(cache, index, speed)?;
-        Ok(Filled { exact, bin, accurate, medium, speed, memory })
+        let index = sampling::speed_bin(&prepared.setup, speed).unwrap_or(SPEED_BINS);
+        let bin = cache.tables(index, speed)?;
+        Ok(Filled { prepared, bin, accurate, medium, speed, memory })
     }
 }
 
@@ -100,7 +106,7 @@ impl<'b> Filled<'b> {
 
     /// Admittance: computes the plate's response at every pair.
     pub fn admittance<'a>(&'a mut self) -> Responded<'a, 'b> {
-        let (isa, tables, medium) = (self.exact.isa, &self.bin.tables, &self.medium);
+        let (isa, tables, medium) = (self.prepared.isa, &self.bin.tables, &self.medium);
         let lines = &tables.lines[..self.band().lines];
         let StageWorkspace { exact: ExactWorkspace { fast, accurate, .. }, responses } =
             &mut *self.memory;
@@ -119,10 +125,10 @@ impl<'b> Filled<'b> {
 impl<'b> Responded<'_, 'b> {
     /// Wavenumber sum: computes the spectra at every receiver.
     pub fn sum(&mut self) -> Summed<'_, 'b> {
-        let Filled { exact, bin, memory, .. } = &mut *self.0;
+        let Filled { prepared, bin, memory, .. } = &mut *self.0;
         memory.exact.spectra.clear(&bin.tables);
         for (i, responses) in memory.responses.iter().enumerate() {
-            memory.exact.spectra.sum(exact.isa, &bin.tables, i, responses);
+            memory.exact.spectra.sum(prepared.isa, &bin.tables, i, responses);
         }
         Summed(self.0)
     }
@@ -134,8 +140,8 @@ impl<'b> Summed<'_, 'b> {
     /// # Errors
     /// If a number is not finite.
     pub fn synthesis(&mut self) -> Result<Observed<'_, 'b>, Failure> {
-        let Filled { exact, bin, speed, memory, .. } = &mut *self.0;
-        exact.observe(*speed, bin, &bin.first, &mut memory.exact)?;
+        let Filled { prepared, bin, speed, memory, .. } = &mut *self.0;
+        pass::observe(prepared, *speed, bin, &bin.first, &mut memory.exact)?;
         Ok(Observed(self.0))
     }
 }
@@ -146,9 +152,9 @@ impl Observed<'_, '_> {
     /// # Errors
     /// If there is no acceptable pick.
     pub fn picking(&self) -> Result<Arrival, Failure> {
-        let Filled { exact, bin, memory, .. } = &*self.0;
+        let Filled { prepared, bin, memory, .. } = &*self.0;
         let band = self.0.band();
-        let found = exact.picked(bin, band, &memory.exact)?;
+        let found = pass::picked(prepared, bin, band, &memory.exact)?;
         Ok(found.arrival(1, band.sampled.pairs))
     }
 }

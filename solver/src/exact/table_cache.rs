@@ -2,24 +2,22 @@
 //! a sampling for waves up to its upper edge, and its tables are made when a bone first needs them.
 
 use std::ops::Deref;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use osteon_common::case::Setup;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
+use osteon_common::outcome::FailureKind;
 use osteon_common::sampling::{BANDS, Grade, OuterFaces, SPEED_BINS, WaveSampling};
 
-use crate::exact::pass::BinTables;
+use crate::exact::bin_tables::BinTables;
+use crate::exact::table_memory::TableMemory;
+use crate::failure::{Failure, readable};
 
 /// A bone may need this many times the maximum number of pairs of the setup's usual sampling before
 /// it fails.
 const PAIRS_MARGIN: f64 = 8.0;
 /// Maximum number of pairs of a bone.
-pub(crate) const PAIRS_MAX: f64 = PAIRS_MARGIN * SAMPLING_PAIRS_MAX;
-/// Memory for tables that one solver keeps, bytes; further ones are recomputed when needed, which
-/// takes several times as long as what they are for.
-const TABLE_BYTES_MAX: u64 = 160_000_000;
-
+const PAIRS_MAX: f64 = PAIRS_MARGIN * SAMPLING_PAIRS_MAX;
 /// Samplings of one grade, with or without outer faces, by speed.
 #[derive(Debug)]
 pub(crate) struct TableCache {
@@ -30,10 +28,6 @@ pub(crate) struct TableCache {
     /// Each slot is filled when a bone first needs it.
     slots: [OnceLock<Slot>; SPEED_BINS],
 }
-
-/// Memory of the tables that all caches of a solver keep, bytes.
-#[derive(Debug, Default)]
-pub(crate) struct TableMemory(AtomicU64);
 
 /// Tables that are cached, or that were made for one pass.
 #[derive(Debug)]
@@ -64,14 +58,14 @@ impl TableCache {
         Self { setup: *setup, grade, faces, memory, slots: [const { OnceLock::new() }; SPEED_BINS] }
     }
 
-    /// Returns the tables of the speed bin at `index`, unless it is too large.
-    pub(crate) fn tables(&self, index: usize) -> Option<TablesRef<'_>> {
-        match self.slots.get(index)?.get_or_init(|| self.slot(index)) {
-            Slot::Tables(bin) => Some(TablesRef::Cached(bin)),
-            Slot::SamplingOnly(sampling) => {
-                Some(TablesRef::Temporary(Box::new(BinTables::new(&self.setup, **sampling, None))))
+    /// Returns the tables of the speed bin at `index`; `speed` (m/s) is named if they are too large.
+    pub(crate) fn tables(&self, index: usize, speed: f64) -> Result<TablesRef<'_>, Failure> {
+        match self.slots.get(index).map(|slot| slot.get_or_init(|| self.slot(index))) {
+            Some(Slot::Tables(bin)) => Ok(TablesRef::Cached(bin)),
+            Some(Slot::SamplingOnly(sampling)) => {
+                Ok(TablesRef::Temporary(Box::new(BinTables::new(&self.setup, **sampling, None))))
             }
-            Slot::TooLarge => None,
+            Some(Slot::TooLarge) | None => Err(too_large(speed)),
         }
     }
 
@@ -98,14 +92,15 @@ impl TableCache {
     }
 }
 
-impl TableMemory {
-    /// Reserves this much memory; returns whether the limit allows it.
-    pub(crate) fn reserve(&self, bytes: u64) -> bool {
-        let may = self.0.fetch_add(bytes, Ordering::Relaxed) + bytes <= TABLE_BYTES_MAX;
-        if !may {
-            self.0.fetch_sub(bytes, Ordering::Relaxed);
-        }
-        may
+/// Returns the failure of a bone whose waves of up to `speed` (m/s) need too large tables.
+pub(crate) fn too_large(speed: f64) -> Failure {
+    Failure {
+        kind: FailureKind::NoConvergence,
+        detail: format!(
+            "waves of up to {} m/s need more than {:.0e} (frequency, wavenumber) pairs",
+            readable(speed),
+            PAIRS_MAX
+        ),
     }
 }
 
@@ -129,6 +124,7 @@ mod tests {
     use super::*;
     use crate::exact::Exact;
     use crate::exact::pass::ExactWorkspace;
+    use crate::exact::table_memory::TABLE_BYTES_MAX;
     use crate::isa::Isa;
 
     const OPTIMUM: Point =
@@ -145,16 +141,17 @@ mod tests {
         let setup = Setup::default();
         let ensemble = Ensemble::new(&OPTIMUM, 7).unwrap();
         let bones: Vec<_> = (0..6).map(|index| ensemble.bone(index).unwrap()).collect();
-        let keeps = Exact::new(&setup, Isa::fastest(), &Arc::new(TableMemory::default()));
-        let expected = bits(&keeps, &bones);
-        let held = |exact: &Exact| exact.without_faces.quick.memory.0.load(Ordering::Relaxed);
-        assert!(held(&keeps) < TABLE_BYTES_MAX, "{}", held(&keeps));
+        let memory = Arc::new(TableMemory::default());
+        let expected = bits(&Exact::new(&setup, Isa::fastest(), &memory), &bones);
+        let needed = memory.reserved();
+        assert!((1..TABLE_BYTES_MAX).contains(&needed), "{needed}");
         // No bin is kept; some bins and lines are.
-        for free in [0, held(&keeps) / 4, held(&keeps) / 2] {
-            let keeps_few = Exact::new(&setup, Isa::fastest(), &Arc::new(TableMemory::default()));
-            assert!(keeps_few.without_faces.quick.memory.reserve(TABLE_BYTES_MAX - free));
+        for free in [0, needed / 4, needed / 2] {
+            let memory = Arc::new(TableMemory::default());
+            assert!(memory.reserve(TABLE_BYTES_MAX - free));
+            let keeps_few = Exact::new(&setup, Isa::fastest(), &memory);
             assert_eq!(bits(&keeps_few, &bones), expected, "{free} bytes free");
-            assert!(held(&keeps_few) <= TABLE_BYTES_MAX, "{}", held(&keeps_few));
+            assert!(memory.reserved() <= TABLE_BYTES_MAX, "{}", memory.reserved());
         }
     }
 }

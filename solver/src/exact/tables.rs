@@ -10,8 +10,8 @@ use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling};
 
 use crate::complex::Complex;
 use crate::exact::attenuation::LosslessFrequencies;
-use crate::exact::table_cache::TableMemory;
-use crate::exact::tilted::{HeightFactors, height_factors};
+use crate::exact::height_factors::{HeightFactors, height_factors};
+use crate::exact::table_memory::TableMemory;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::pulse::Pulse;
 

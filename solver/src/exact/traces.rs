@@ -6,14 +6,16 @@ use osteon_common::probe::Place;
 use osteon_common::sampling::{self, WaveSampling, trace_taper};
 use thiserror::Error;
 
+use crate::exact::direct;
 use crate::exact::plate::AccuratePlate;
 use crate::exact::response::Spectra;
 use crate::exact::signal::Signal;
 use crate::exact::tables::{Tables, Waves};
-use crate::exact::{FillPlate, Solid, direct};
+use crate::exact::tensor::{FillPlate, Solid};
+use crate::failure::OUT_OF_SCALE;
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
-use crate::solver::{OUT_OF_SCALE, Solver};
+use crate::solver::Solver;
 use crate::vector::Vector;
 
 /// Maximum number of pressures, all receivers together: 40 MB.

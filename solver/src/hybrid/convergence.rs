@@ -12,7 +12,7 @@ use super::mesh::Mesh;
 use super::operator::Operator;
 use super::plan::Times;
 use super::scope::Scope;
-use crate::Failure;
+use crate::failure::Failure;
 use crate::isa::Isa;
 use crate::lanes::{LANES, Lanes};
 use crate::medium::Medium;

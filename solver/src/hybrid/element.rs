@@ -7,6 +7,9 @@ use std::f64::consts::PI;
 /// Newton steps on a node; convergence is quadratic from Chebyshev's nodes.
 const NEWTON_STEPS: usize = 10;
 
+/// Nodes of an element of the default degree, for which loops are unrolled.
+pub(super) const USUAL_NODES: usize = 9;
+
 /// Nodes, weights and derivatives of one polynomial degree.
 #[derive(Debug, Clone)]
 pub(super) struct Element {
@@ -39,6 +42,17 @@ impl Element {
     /// Number of nodes.
     pub(super) fn count(&self) -> usize {
         self.nodes.len()
+    }
+
+    /// Returns -E D / J of an element of half length `half` (m), by rows.
+    pub(super) fn stiffness(&self, half: f64) -> Vec<Vec<f64>> {
+        let count = self.count();
+        let (d, w) = (&self.derivative, &self.weights);
+        let entry = |i: usize, j: usize| {
+            let sum = (0..count).fold(0.0, |sum, m| (w[m] * d[m][i]).mul_add(d[m][j], sum));
+            -sum / (w[i] * half * half)
+        };
+        (0..count).map(|i| (0..count).map(|j| entry(i, j)).collect()).collect()
     }
 
     /// Values of the interpolating polynomials at `x`.

@@ -24,22 +24,22 @@
 mod axes;
 mod fluid;
 mod halves;
+mod shared_node;
+mod sink;
 mod solid;
 
 use osteon_common::case::{Bone, Setup};
 
 use self::fluid::FluidLayer;
+pub(super) use self::sink::{Keep, Sink};
 use self::solid::SolidLayer;
 pub(super) use self::solid::{SOLID, Scratch};
-use super::element::Element;
 use super::mesh::Mesh;
 use crate::lanes::Lanes;
 use crate::vector::Vector;
 
 /// Real numbers per node of fluid 2.
 const MARROW: usize = 2;
-/// Nodes of an element of the default degree, for which loops are unrolled.
-const USUAL_NODES: usize = 9;
 /// A length by which displacements are scaled, m.
 const LENGTH: f64 = 1e-3;
 
@@ -151,45 +151,6 @@ impl<const COUPLING: usize> Operator<COUPLING> {
             across[1] = depth.mul_add(face[i + 3], across[1]);
         }
         across
-    }
-}
-
-/// Processes A x while it is still in the fast memory.
-///
-/// The free ends of the fluids, where p = 0 always, are left out.
-pub(super) trait Sink {
-    /// Receives numbers `start` … of A x in `values`. Must be `#[inline(always)]`.
-    fn take<V: Vector>(&mut self, start: usize, values: &[Lanes]);
-}
-
-/// Does nothing.
-pub(super) struct Keep;
-
-impl Sink for Keep {
-    #[inline(always)]
-    fn take<V: Vector>(&mut self, _: usize, _: &[Lanes]) {}
-}
-
-/// Returns -E D / J of an element of half length `half` (m), by rows.
-fn stiffness(element: &Element, half: f64) -> Vec<Vec<f64>> {
-    let count = element.count();
-    let (d, w) = (&element.derivative, &element.weights);
-    let entry = |i: usize, j: usize| {
-        let sum = (0..count).fold(0.0, |sum, m| (w[m] * d[m][i]).mul_add(d[m][j], sum));
-        -sum / (w[i] * half * half)
-    };
-    (0..count).map(|i| (0..count).map(|j| entry(i, j)).collect()).collect()
-}
-
-/// Returns the mean of the values of two elements at their shared node.
-#[inline(always)]
-fn average<const C: usize, V: Vector>(below: &[Lanes; C], node: &mut [Lanes; C]) {
-    let half = V::splat(0.5);
-    for c in 0..C {
-        for part in 0..V::PARTS {
-            let sum = V::load(&node[c], part).add(V::load(&below[c], part));
-            half.mul(sum).store(&mut node[c], part);
-        }
     }
 }
 

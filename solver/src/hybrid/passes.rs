@@ -9,10 +9,10 @@ use super::operator::Operator;
 use super::plan::{Plan, SAMPLES_BEYOND, Times, WorkBudget, thinness};
 use super::samples::{LowPass, Samples};
 use super::scope::{Scope, Span};
+use crate::arrival::Arrival;
+use crate::failure::{Failure, pressure_not_finite};
 use crate::isa::Isa;
 use crate::picking::{FLOOR, Pick, Window, pick};
-use crate::solver::pressure_not_finite;
-use crate::{Arrival, Failure};
 
 /// Fineness of the first pass, relative to the setup. In a thin plate all passes are finer, by the
 /// square root of the thinness.

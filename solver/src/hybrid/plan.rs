@@ -10,7 +10,7 @@ use osteon_common::sampling::{earliest_arrival, nearest_and_farthest, smooth_ste
 
 use super::mesh::Mesh;
 use super::scope::Scope;
-use crate::Failure;
+use crate::failure::Failure;
 use crate::lanes::LANES;
 
 /// Highest frequency, as a multiple of the centre frequency, whose waves along the coupling fluid

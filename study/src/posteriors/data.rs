@@ -4,7 +4,7 @@ use osteon_common::job::{Data, Measurements};
 use osteon_common::parameters::Point;
 use osteon_common::realization::PointError;
 
-use super::PosteriorCalibration;
+use super::calibration::{PosteriorCalibration, Scenario};
 use crate::generator::Generator;
 use crate::identify::velocities;
 
@@ -23,40 +23,6 @@ const STEP: f64 = 10.0;
 const OUTLIERS: f64 = 0.01;
 /// Degrees of freedom of the law with heavy tails, times 1/2.
 const HALF_FREEDOM: usize = 3;
-
-/// How velocities are made from realizations of the model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scenario {
-    /// They are independent realizations.
-    Independent,
-    /// Each subject has four velocities; between a fifth and nearly all of the variance lies between
-    /// subjects, often nearly all.
-    Subjects,
-    /// They are rounded to 10 m/s.
-    Rounded,
-    /// One in a hundred is half or twice the velocity.
-    Outliers,
-    /// Their deviations from the mean are scaled to those of Student's law with six degrees of
-    /// freedom, with the same variance.
-    HeavyTails,
-}
-
-impl Scenario {
-    /// All scenarios.
-    pub const ALL: [Self; 5] =
-        [Self::Independent, Self::Subjects, Self::Rounded, Self::Outliers, Self::HeavyTails];
-
-    /// Returns the name used on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Independent => "independent",
-            Self::Subjects => "subjects",
-            Self::Rounded => "rounded",
-            Self::Outliers => "outliers",
-            Self::HeavyTails => "heavy-tails",
-        }
-    }
-}
 
 /// Returns the data of parameter set `number`; `None` if too many realizations fail.
 pub(super) fn simulated(

@@ -6,7 +6,7 @@ use osteon_common::outcome::Outcome;
 use osteon_common::posterior::PosteriorSummary;
 use osteon_common::realization::Ensemble;
 use osteon_common::statistics::estimate;
-use osteon_solver::Solver;
+use osteon_solver::{Isa, Solver};
 
 use super::*;
 use crate::draws::{OPTIMUM, solved};

@@ -3,8 +3,9 @@
 use osteon_common::layers::Fluid;
 
 use super::halves::{HALF, Halves};
-use super::{Sink, USUAL_NODES, average, stiffness};
-use crate::hybrid::element::Element;
+use super::shared_node::average;
+use super::sink::Sink;
+use crate::hybrid::element::{Element, USUAL_NODES};
 use crate::hybrid::mesh::LayerMesh;
 use crate::lanes::Lanes;
 use crate::vector::Vector;
@@ -27,7 +28,7 @@ impl FluidLayer {
     pub(super) fn new(fluid: &Fluid, mesh: &LayerMesh, element: &Element, scale: f64) -> Self {
         let half = 0.5 * mesh.size;
         let square = fluid.sound_speed * fluid.sound_speed;
-        let stiffness = stiffness(element, half);
+        let stiffness = element.stiffness(half);
         Self {
             elements: mesh.elements,
             count: element.count(),

@@ -16,8 +16,9 @@ use osteon_common::case::Bone;
 
 use super::axes::principal_axes;
 use super::halves::{HALF, Halves};
-use super::{Sink, USUAL_NODES, average, stiffness};
-use crate::hybrid::element::Element;
+use super::shared_node::average;
+use super::sink::Sink;
+use crate::hybrid::element::{Element, USUAL_NODES};
 use crate::hybrid::mesh::LayerMesh;
 use crate::lanes::Lanes;
 use crate::medium::Matrix3;
@@ -86,7 +87,7 @@ impl SolidLayer {
         let each = |entry: &dyn Fn(usize, usize) -> f64| -> Matrix3 {
             std::array::from_fn(|i| std::array::from_fn(|m| entry(i, m)))
         };
-        let stiffness = stiffness(element, half);
+        let stiffness = element.stiffness(half);
         Self {
             elements: mesh.elements,
             count,

@@ -3,6 +3,7 @@ use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 
 use super::*;
+use crate::hybrid::element::Element;
 use crate::hybrid::mesh::LayerMesh;
 use crate::hybrid::scope::Scope;
 use crate::hybrid::stepping::{WaveState, stability_limit};
