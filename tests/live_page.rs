@@ -116,7 +116,8 @@ fn a_job_is_watched_to_its_end() {
 #[test]
 fn figures_grow_while_a_job_runs() {
     let served = Served::start(&[]);
-    let id = served.submit(40, 300, &[]);
+    // Some seconds, so that it goes on after its first figures.
+    let id = served.submit(400, 300, &[]);
     let mut updates = served.page.events(&format!("job={id}"), &[]).unwrap();
     let first = updates.until("figures", |_| true);
     assert_eq!(names(&first), Vec::<&str>::new());
