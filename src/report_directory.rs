@@ -6,8 +6,8 @@ use std::path::Path;
 use anyhow::{Context as _, anyhow};
 use osteon_client::result_files::{self, RESULT, remove_if_there};
 use osteon_client::results_directory::{
-    CASE, COMPARISON, HISTORY, JOB, POSTERIOR, REALIZATIONS, given, job_of, make_directory,
-    result_of, result_path,
+    CASE, COMPARISON, HISTORY, JOB, POSTERIOR, REALIZATIONS, job_of, make_directory,
+    read_named_file, result_of, result_path,
 };
 use osteon_common::visible;
 use osteon_files::case_file;
@@ -29,7 +29,7 @@ const PAGE: &str = "index.html";
 /// # Errors
 /// Bad input if there are none, or if a file of them is damaged.
 pub(crate) fn read(directory: &Path) -> Result<ReportedRun, CommandFailure> {
-    let Some(text) = given(&directory.join(RESULT))? else {
+    let Some(text) = read_named_file(&directory.join(RESULT))? else {
         return Err(CommandFailure::bad_input(anyhow!(
             "{} does not exist: {} holds no complete results; run `osteon identify`, `propagate` or \
              `simulate` with --out DIR first",
@@ -40,7 +40,7 @@ pub(crate) fn read(directory: &Path) -> Result<ReportedRun, CommandFailure> {
     // The name that people gave it, without what leads there: a report has no paths.
     let name = fs::canonicalize(directory).unwrap_or_else(|_| directory.to_owned());
     let name = name.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let text_of = |file: &str| given(&directory.join(file));
+    let text_of = |file: &str| read_named_file(&directory.join(file));
     let damaged = |error: TableError| {
         CommandFailure::bad_input(anyhow!(
             "a table in {} is damaged: {error}; remove {RESULT} there and run it again",
@@ -81,11 +81,11 @@ fn simulation(
     };
     let result = Simulation::from_json(text).map_err(unreadable)?;
     let path = directory.join(CASE);
-    let case = given(&path)?.unwrap_or_default();
+    let case = read_named_file(&path)?.unwrap_or_default();
     let case = case_file::parse(&case, Format::Toml)
         .with_context(|| format!("{} cannot be read", visible::path(&path)))
         .map_err(CommandFailure::BadInput)?;
-    let traces = given(&directory.join(TRACES))?;
+    let traces = read_named_file(&directory.join(TRACES))?;
     Ok(ReportedRun::simulation(name, result, case, traces.as_deref()))
 }
 
@@ -104,7 +104,7 @@ pub(crate) fn write(out: &Path, runs: &[ReportedRun]) -> Result<String, CommandF
             visible::path(out)
         )));
     }
-    let earlier = match given(&page)? {
+    let earlier = match read_named_file(&page)? {
         None => Vec::new(),
         Some(text) => osteon_report::files_of(&text).ok_or_else(|| {
             CommandFailure::bad_input(anyhow!(

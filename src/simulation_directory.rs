@@ -9,7 +9,7 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use osteon_client::result_files::{RESULT, ResultFiles, ResultOrigin};
-use osteon_client::results_directory::{CASE, JOB, ResultsDirectory, difference, given};
+use osteon_client::results_directory::{CASE, JOB, ResultsDirectory, difference, read_named_file};
 use osteon_common::case::Case;
 use osteon_common::visible;
 use osteon_files::case_file;
@@ -68,7 +68,7 @@ impl SimulationKey<'_> {
     pub(crate) fn refuse_other(&self, directory: &Path) -> Result<(), CommandFailure> {
         let there = |name: &str| directory.join(name).symlink_metadata().is_ok();
         let shown = visible::path(directory);
-        let stored = given(&directory.join(CASE))?;
+        let stored = read_named_file(&directory.join(CASE))?;
         let why = match stored {
             Some(stored) => match self.difference_from(&stored) {
                 None => return Ok(()),

@@ -23,9 +23,8 @@ use crate::error::ANSWER_S_MAX;
 use crate::listener::RunListener;
 use crate::parts::FetchedParts;
 use crate::peer::{Peer, with_wait_notice};
-use crate::request_id::RequestId;
-
 use crate::remote::{SILENCE_S_MAX, answer_limit};
+use crate::request_id::RequestId;
 
 pub use crate::error::ClientError;
 pub use crate::fetched::Fetched;
@@ -74,7 +73,7 @@ impl Client {
         Ok(Self { peer: Peer::new(remote, listener), jobs })
     }
 
-    /// Returns who is told what the client waits for.
+    /// Returns the listener that receives the client's notes.
     #[must_use]
     pub fn listener(&self) -> &dyn RunListener {
         &*self.peer.listener

@@ -1,4 +1,4 @@
-//! What is fetched of an ended job.
+//! The results of an ended job, as a coordinator sends them.
 
 use osteon_common::job::JobSpecification;
 use osteon_common::results::{Evaluation, JobResult};

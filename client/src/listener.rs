@@ -1,11 +1,11 @@
-//! What a client tells the program that uses it.
+//! Notes for the user, and spans, which a client passes to the program that uses it.
 
 use std::fmt::Debug;
 use std::sync::Arc;
 
 use osteon_proto::spans::SpanRecorder;
 
-/// Takes what a client has to tell beside its results.
+/// Receives a client's notes for the user, and says where its spans are recorded.
 pub trait RunListener: Debug + Send + Sync {
     /// Takes a note for the user, for instance that the coordinator does not answer yet: one or several lines
     /// without a line break at the end.

@@ -17,7 +17,7 @@ use tonic_health::pb::health_client::HealthClient;
 
 use crate::client::{Client, loaded};
 use crate::error::ClientError;
-use crate::listener::Silent;
+use crate::listener::RunListener;
 use crate::peer::Peer;
 use crate::remote::{Remote, answer_limit};
 
@@ -86,7 +86,11 @@ impl Client {
 
 /// Asks a coordinator once whether it serves, and waits at most `limit`. This requires no token,
 /// and none is sent.
-pub async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientError> {
+pub async fn health(
+    remote: &Remote,
+    limit: Duration,
+    listener: Arc<dyn RunListener>,
+) -> Result<bool, ClientError> {
     let Remote { endpoint, files, unused, .. } = remote;
     let files = CredentialFiles { token: None, ..files.clone() };
     let mut patience = Patience::of(limit);
@@ -102,6 +106,6 @@ pub async fn health(remote: &Remote, limit: Duration) -> Result<bool, ClientErro
         connected.await.map_err(|error: ClientError| error.with_unused_variables(unused))?;
     let mut client = HealthClient::new(connection);
     let call = client.check(HealthCheckRequest::default());
-    let answer = Peer::new(remote, Arc::new(Silent)).answered_within(&mut patience, call).await?;
+    let answer = Peer::new(remote, listener).answered_within(&mut patience, call).await?;
     Ok(answer.status() == ServingStatus::Serving)
 }

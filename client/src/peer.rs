@@ -26,7 +26,7 @@ pub(crate) struct Peer {
     ever_answered: bool,
     /// Environment variables that were not used for it.
     unused: Unused,
-    /// Who is told what is waited for.
+    /// Receives a note while an answer is waited for.
     pub(crate) listener: Arc<dyn RunListener>,
 }
 

@@ -71,8 +71,8 @@ impl ResultsDirectory {
                 visible::path(path)
             )));
         }
-        let result = given(&path.join(RESULT))?;
-        match given(&job)? {
+        let result = read_named_file(&path.join(RESULT))?;
+        match read_named_file(&job)? {
             Some(stored) => same_job(&job, &stored, specification)?,
             None if result.is_some() && !path.join(CASE).exists() => {
                 return Err(RunError::bad_input(anyhow!(
@@ -260,7 +260,7 @@ pub fn make_directory(path: &Path) -> Result<(), RunError> {
 }
 
 /// Returns the text of a file in a directory named by the user; `None` if there is no such file.
-pub fn given(path: &Path) -> Result<Option<String>, RunError> {
+pub fn read_named_file(path: &Path) -> Result<Option<String>, RunError> {
     read_if_there(path).map_err(|error| match error.downcast::<std::io::Error>() {
         Ok(error) => RunError::unusable_path(error, format!("cannot read {}", visible::path(path))),
         Err(error) => RunError::Failed(error),

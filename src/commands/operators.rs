@@ -60,7 +60,7 @@ pub(super) async fn health(
     limit: Duration,
     format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
-    let reason = match operators::health(coordinator, limit).await {
+    let reason = match operators::health(coordinator, limit, user::listener()).await {
         Ok(true) => None,
         Ok(false) => Some(anyhow!(
             "the coordinator at {} reports that it is not serving",

@@ -165,15 +165,17 @@ async fn run_at(
     shown: ShownProgress,
     interruption: impl Future<Output = Interruption>,
 ) -> Result<Fetched, CommandFailure> {
-    let mut progress = Progress::start(job.specification, shown);
+    // Its time counts from the job's acceptance, not from the start of coordinator and workers.
+    let mut progress: Option<Progress> = None;
     // Whoever started this run has ended, and its result would be lost.
     let show = |snapshot: &JobSnapshot| {
+        let progress = progress.get_or_insert_with(|| Progress::start(job.specification, shown));
         progress.show(snapshot).map_err(|_| {
             let left = "the program that reads the progress has closed stderr";
             CommandFailure::Interrupted(Interruption::Terminated, left)
         })
     };
-    let fetched = match location {
+    match location {
         ConnectedLocation::Local { workers, threads } => {
             let left = match job.directory {
                 Some(_) => "run the same command again to resume",
@@ -200,7 +202,5 @@ async fn run_at(
                 "a job that was accepted continues (see `osteon jobs`, `osteon cancel`)",
             )),
         },
-    };
-    progress.finish();
-    fetched
+    }
 }

@@ -7,6 +7,8 @@ use osteon_client::operators;
 
 use super::Diagnosis;
 
+use crate::user;
+
 const CHECK: &str = "coordinator";
 /// Longest wait for the answer.
 const LIMIT: Duration = Duration::from_secs(10);
@@ -17,7 +19,7 @@ const SLOW: Duration = Duration::from_millis(250);
 pub(super) async fn examine(coordinator: &Remote) -> Diagnosis {
     let endpoint = &coordinator.endpoint;
     let begun = Instant::now();
-    match operators::health(coordinator, LIMIT).await {
+    match operators::health(coordinator, LIMIT, user::listener()).await {
         Ok(true) if begun.elapsed() > SLOW => Diagnosis::warning(
             CHECK,
             format!("{endpoint} serves, after {:.0} ms", 1e3 * begun.elapsed().as_secs_f64()),
