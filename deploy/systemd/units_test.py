@@ -189,10 +189,10 @@ class Relied(unittest.TestCase):
             ("osteon-coordinator", "--liste 127.0.0.1:0"),
             ("osteon-worker", "--threads none"),
         ]:
-            prevents = int(unit(name)["Service"]["RestartPreventExitStatus"])
+            prevented = unit(name)["Service"]["RestartPreventExitStatus"].split()
             variables = {f"{name.upper().replace('-', '_')}_OPTIONS": options}
             service = self.start(name, command(name, variables), variables)
-            self.assertEqual(service.process.wait(timeout=60), prevents, service.text())
+            self.assertIn(str(service.process.wait(timeout=60)), prevented, service.text())
 
     def test_the_examples_of_tls_name_files_of_the_units_directory(self):
         for name in ("coordinator", "worker"):

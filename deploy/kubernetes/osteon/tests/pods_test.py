@@ -68,6 +68,9 @@ class Cluster:
             path.write_bytes(self.secrets[volume["secretName"]][item["key"]])
             give_to_group(path, volume["defaultMode"])
 
+# The name of the node of every pod: what a variable has whose value Kubernetes knows.
+NODE = "node-1"
+
 
 def give_to_group(path, mode):
     if os.geteuid() == 0:
@@ -85,7 +88,7 @@ class Pod(Service):
         self.replaced = replaced
         self.found = found
         container = chart.container(found)
-        environment = {entry["name"]: entry["value"] for entry in container["env"]}
+        environment = {entry["name"]: entry.get("value", NODE) for entry in container["env"]}
         command = [*container["command"], *container["args"]]
         super().__init__(self.local(command), directory, environment, CONTAINER_USER)
 
