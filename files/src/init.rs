@@ -50,10 +50,11 @@ pub fn of_csv(path: &Path, name: &str) -> Result<FirstJob, InitError> {
     let refused = |problems| InitError { problems };
     let table = velocities::understand(path).map_err(refused)?;
     let roles = Roles::from_table(&table);
-    let measured = velocities::of_table(path, &table, &roles.named()).map_err(refused)?;
     let mut understood = vec![table.described()];
-    understood.extend(measured.account.described(table.missing()));
-    understood.extend(roles.described());
     let data = template::data_section(name, &table, &roles);
+    let missing = table.missing().to_vec();
+    let measured = velocities::read_as_understood(path, table, &roles.named()).map_err(refused)?;
+    understood.extend(measured.account.described(&missing));
+    understood.extend(roles.described());
     Ok(FirstJob { text: template::of_data(&data), understood })
 }

@@ -7,8 +7,10 @@
 //! ([`account`]). What no key says is found out for `osteon init`; for a job it is as documented.
 
 mod account;
+mod cells;
 mod choice;
 mod collected;
+mod column_choice;
 mod columns;
 mod content;
 mod csv_format;
@@ -19,12 +21,17 @@ mod hdf5;
 mod header;
 mod lines;
 mod matlab;
+mod missing;
+mod name_words;
 mod names;
 mod number;
 mod opening;
 mod problem;
+mod row_names;
+mod shapes;
 mod statistics;
 mod summaries;
+mod summed_rows;
 mod table;
 mod text_lines;
 mod units;
@@ -38,6 +45,7 @@ use osteon_common::visible;
 use thiserror::Error;
 
 use self::collected::CollectedVelocities;
+use self::column_choice::POSSIBLE;
 use self::columns::Columns;
 use self::lines::{TableLine, TableLines};
 use self::problem::{LocatedProblem, Problem, shortened};
@@ -84,6 +92,33 @@ pub(crate) fn understand(path: &Path) -> Result<VelocityTable, Vec<CsvError>> {
     VelocityTable::open(path, &format).map_err(|problem| vec![CsvError::located(path, problem)])
 }
 
+/// Returns the velocities that a job has which says of the file at `path` what was understood.
+///
+/// It is read again with the keys of that job, so that what is said of a file is what the job takes.
+///
+/// # Errors
+/// Those of the job's reader, and a velocity that no job may have.
+pub(crate) fn read_as_understood(
+    path: &Path,
+    table: VelocityTable,
+    named: &NamedColumns<'_>,
+) -> Result<Measured<Vec<Group>>, Vec<CsvError>> {
+    let (format, is_unit_guessed) = (table.format(), table.is_unit_guessed());
+    // The file is read once more, and should be in memory once.
+    drop(table);
+    let mut measured = read(path, named, &format)?;
+    measured.account.is_unit_guessed = is_unit_guessed;
+    let lines = measured.origin.lines.iter().flatten();
+    let velocities = measured.data.iter().flat_map(|group| &group.velocities);
+    match velocities.zip(lines).find(|(velocity, _)| !POSSIBLE.contains(velocity)) {
+        Some((&found, &line)) => {
+            let problem = (Some(line as usize), Problem::Impossible { found });
+            Err(vec![CsvError::located(path, problem)])
+        }
+        None => Ok(measured),
+    }
+}
+
 /// Returns the velocities of the file at `path`, m/s, in the file's order: in groups by the names
 /// in the column of groups, in the order of their first occurrence; without such a column, all in one
 /// group without a name.
@@ -115,7 +150,7 @@ pub(crate) fn read(
 ///
 /// # Errors
 /// Those of the rows.
-pub(crate) fn of_table(
+fn of_table(
     path: &Path,
     table: &VelocityTable,
     named: &NamedColumns<'_>,
@@ -145,7 +180,9 @@ fn gather(
     let gathered = CollectedVelocities::new(named.subject.is_some(), table);
     let mut reading =
         RowReading { table, columns, gathered, problems: Vec::new(), below: Vec::new() };
-    for line in TableLines::after_header(&table.content.text, &table.header, Some(table.place())) {
+    let mut lines =
+        TableLines::after_header(&table.content.text, &table.header, Some(table.place()));
+    for line in lines.by_ref() {
         let read =
             line.map_err(|(line, problem)| (line, problem, true)).and_then(|(number, line)| {
                 reading.line(number, line).map_err(|problem| {
@@ -166,6 +203,7 @@ fn gather(
             return Err(reading.problems);
         }
     }
+    reading.gathered.account.comments = lines.comments;
     reading.finish()
 }
 
@@ -234,8 +272,11 @@ fn wrong_shape(table: &VelocityTable, fields: &[String]) -> Problem {
     Problem::FieldCount { found: fields.len(), expected: table.names().len() }
 }
 
-/// Returns the keys that read a file which a job does not, at the end of a message.
+/// Returns what may be the reason, or the keys that read a file which a job does not, at the end of a message.
 fn cure(path: &Path, format: &CsvFormat, problem: &Problem) -> String {
+    if matches!(problem, Problem::Unreadable(_)) {
+        return " (its path is relative to the job file)".to_owned();
+    }
     if format.is_found_out || !problem.may_be_of_format() {
         return String::new();
     }

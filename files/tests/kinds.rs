@@ -7,45 +7,14 @@ use std::io::Write as _;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use osteon_common::job::JobKind;
-use osteon_files::document::Format;
-use osteon_files::{init, job_file};
+use osteon_files::init;
+use support::{refuses, refuses_bytes, takes, takes_bytes};
+
+#[path = "support/first_jobs.rs"]
+mod support;
 
 /// Velocities of the files in `files/`, m/s.
 const VELOCITIES: [f64; 6] = [3900.5, 3951.0, 4000.0, 3875.25, 3930.0, 3988.0];
-
-/// What `init` says of a file, with the job that it writes, and the velocities that this job has.
-fn taken(bytes: &[u8]) -> Result<(String, Vec<f64>), String> {
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("v.csv");
-    std::fs::write(&path, bytes).unwrap();
-    let plain = |text: String| text.replace(&*path.to_string_lossy(), "FILE");
-    let first = init::of_csv(&path, "v.csv").map_err(|error| plain(error.to_string()))?;
-    let job = job_file::parse(&first.text, Format::Toml, directory.path(), JobKind::Identification);
-    let data = job.map_err(|error| plain(error.to_string()))?.data.unwrap();
-    let sets = (0..data.sets()).flat_map(|set| data.set(set).unwrap().velocities.to_vec());
-    Ok((first.understood.join("\n") + "\n" + &first.text, sets.collect()))
-}
-
-fn takes(text: &str, expected: &[f64], said: &str) {
-    takes_bytes(text.as_bytes(), expected, said);
-}
-
-fn takes_bytes(bytes: &[u8], expected: &[f64], said: &str) {
-    let shown = String::from_utf8_lossy(bytes);
-    let found = taken(bytes);
-    assert!(found.is_ok(), "{shown}: {found:?}");
-    let (all, velocities) = found.unwrap();
-    assert_eq!(velocities, expected, "{shown}: {all}");
-    assert!(all.contains(said), "{said} is not in: {all}");
-}
-
-fn refuses(bytes: &[u8], expected: &str) {
-    let message = taken(bytes).map(|(said, _)| said).unwrap_err();
-    assert!(message.contains(expected), "{message}");
-    assert!(message.lines().count() <= 3, "{message}");
-    assert!(message.len() < 700, "{message}");
-}
 
 /// Rows below a header, with velocities written by `cell`.
 fn rows(header: &str, cell: impl Fn(usize, f64) -> String) -> String {
@@ -70,7 +39,7 @@ fn a_header_decides_with_the_size_of_the_numbers() {
         ("id,Vp (m/s),Vs (m/s)", "3900,1950", "several columns may be the velocities: `Vp (m/s)`"),
         ("id,velocity,velocity", "3900,3950", "has the column `velocity` twice"),
     ] {
-        refuses(rows(header, |i, _| format!("{i},{cell}")).as_bytes(), expected);
+        refuses_bytes(rows(header, |i, _| format!("{i},{cell}")).as_bytes(), expected);
     }
 }
 
@@ -97,11 +66,11 @@ fn numbers_are_read_as_people_write_them() {
             rows(&format!("id{separator}velocity"), |i, v| format!("{i}{separator}{}", cell(v)));
         takes(&text, &VELOCITIES, "column 2 \"velocity\"");
     }
-    refuses(
+    refuses_bytes(
         b"velocity\n3900.5\n3. Sep\n3910\n3920\n",
         "line 3: the column `velocity` has \"3. Sep\"",
     );
-    refuses(b"id;velocity\n1;3900,5\n2;3910.25\n", "another decimal mark than in line 2");
+    refuses_bytes(b"id;velocity\n1;3900,5\n2;3910.25\n", "another decimal mark than in line 2");
 }
 
 #[test]
@@ -121,7 +90,7 @@ fn what_is_no_measurement_is_left_out_and_said() {
         "1 row left out: line 9 \"End of data\"",
     );
     takes(&format!("{table},{mean:.1}\n"), &VELOCITIES, "1 row left out: line 8 \"3940.8\"");
-    refuses(
+    refuses_bytes(
         format!("{table}Mean,3890.0\n").as_bytes(),
         "line 8: the velocity of \"Mean\" is \"3890.0\", and the other rows give 3940.8",
     );
@@ -134,7 +103,7 @@ fn what_is_no_measurement_is_left_out_and_said() {
     );
     takes(&max, &VELOCITIES, "6 velocities");
     // Nobody can know whether somebody is called so, if another has the same value.
-    refuses(
+    refuses_bytes(
         table.replace("\n1,3951", "\nMax,4000").as_bytes(),
         "the velocity of \"Max\" is \"4000\"",
     );
@@ -154,10 +123,10 @@ fn lines_above_the_table_are_no_part_of_it() {
         takes(&text, &VELOCITIES, &format!("header_line = {line}\n"));
     }
     takes(&rows("# id velocity", |i, v| format!("{i} {v}")), &VELOCITIES, "separator = \"space\"");
-    refuses(b"1,3900.5\n2,3951.0\n", "[data] header_line = 0, column = \"1\"");
+    refuses_bytes(b"1,3900.5\n2,3951.0\n", "[data] header_line = 0, column = \"1\"");
     let second = rows("id,speed", |i, v| format!("{i},{v}"));
     let two = rows("id,velocity", |i, v| format!("{i},{v}")) + "\n" + &second;
-    refuses(two.as_bytes(), "line 9: has names of columns again, others than in line 1");
+    refuses(&two, "line 9: has names of columns again, others than in line 1");
 }
 
 #[test]
@@ -165,7 +134,7 @@ fn rows_are_those_of_r_and_of_programs_that_end_lines_with_a_separator() {
     let quoted = rows("\"thickness_mm\",\"velocity\"", |i, v| format!("\"{}\",4.41,{v}", i + 1));
     takes(&quoted, &VELOCITIES, "column 3 \"velocity\"");
     takes(&rows("velocity,patient", |i, v| format!("{v},P{i},")), &VELOCITIES, "column 1");
-    refuses(
+    refuses_bytes(
         rows("id,velocity", |i, v| format!("{i},{v},5")).as_bytes(),
         "the number of fields is 3",
     );
@@ -194,7 +163,7 @@ fn files_that_are_no_text_are_read_or_named() {
         (b"\x1f\x8b\x08\0\0", "a gzip file that cannot be read"),
         (b"velocity\n39\x0012\n", "line 2: has a character 0"),
     ] {
-        refuses(bytes, expected);
+        refuses_bytes(bytes, expected);
     }
 }
 
@@ -205,7 +174,7 @@ fn what_unpacks_to_too_much_is_refused_before() {
     for _ in 0..65 {
         packed.write_all(&zeros).unwrap();
     }
-    refuses(&packed.finish().unwrap(), "is longer than 67108864 bytes");
+    refuses_bytes(&packed.finish().unwrap(), "is longer than 67108864 bytes");
 }
 
 #[test]

@@ -41,18 +41,21 @@ pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFail
     };
     let mut stdout = output::stdout(OutputFormat::Text);
     let account = velocities.as_deref().map(|csv| account(csv, &first.understood));
+    // A job that cannot run because of its data is not written.
+    if velocities.is_some() {
+        let beside =
+            if is_printed { Path::new("") } else { path.parent().unwrap_or(Path::new("")) };
+        let job = job_file::parse(&first.text, Format::Toml, beside, JobKind::Identification);
+        job.map_err(|error| {
+            CommandFailure::bad_input(
+                anyhow!(error).context("no job was written, as it could not run"),
+            )
+        })?;
+    }
     if is_printed {
         // Beside the job, since what was taken for a velocity is always said.
         account.iter().flat_map(|account| account.lines()).for_each(say);
         stdout.verbatim(&first.text).map_err(stdout_failure)?;
-        // What is wrong with the values themselves is said of a printed job, too.
-        if velocities.is_some() {
-            let (kind, here) = (JobKind::Identification, Path::new(""));
-            let job = job_file::parse(&first.text, Format::Toml, here, kind);
-            job.map_err(|error| {
-                CommandFailure::bad_input(anyhow!(error).context("the job cannot be run yet"))
-            })?;
-        }
         return Ok(ExitStatus::Done);
     }
     new_files::create(&[NewFile { path: path.clone(), text: first.text.into(), secret: false }])?;
@@ -62,15 +65,6 @@ pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFail
     said += "  set the geometry of your device, and what you know of the bone, in that file\n";
     said += &format!("  osteon check {shown}\n  osteon identify {shown}\n");
     stdout.verbatim(&said).map_err(stdout_failure)?;
-    // What is wrong with the values themselves is said now rather than at the first run.
-    if velocities.is_some() {
-        let job = job_file::read_with_warnings(&path, JobKind::Identification);
-        job.map_err(|error| {
-            CommandFailure::bad_input(
-                anyhow!(error).context(format!("{shown} was written, but cannot be run yet")),
-            )
-        })?;
-    }
     Ok(ExitStatus::Done)
 }
 

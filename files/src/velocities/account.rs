@@ -12,6 +12,8 @@ const NAMED_MAX: usize = 5;
 pub(crate) struct Account {
     /// Number and name of the column, and its unit.
     column: String,
+    /// Whether the unit follows from the size of the numbers alone.
+    pub(super) is_unit_guessed: bool,
     count: usize,
     sum: f64,
     /// Lines of the first and of the last velocity.
@@ -23,6 +25,8 @@ pub(crate) struct Account {
     left_out_count: usize,
     /// Number of rows with a missing value.
     pub(super) missing: u32,
+    /// Number of lines below the header that are comments.
+    pub(super) comments: usize,
     /// Two groups whose names hardly differ.
     pub(super) alike: Option<[String; 2]>,
 }
@@ -31,10 +35,10 @@ impl Account {
     pub(super) fn of_column(table: &VelocityTable) -> Self {
         let place = table.place();
         let name = table.names().get(place).map_or("", String::as_str);
-        let guess = if table.is_unit_guessed() { ", a guess from their size" } else { "" };
-        let column = format!("column {} {name:?} (unit {}{guess})", place + 1, table.unit().name());
+        let column = format!("column {} {name:?} (unit {}", place + 1, table.unit().name());
         Self {
             column,
+            is_unit_guessed: table.is_unit_guessed(),
             count: 0,
             sum: 0.0,
             lines: None,
@@ -42,6 +46,7 @@ impl Account {
             left_out: Vec::new(),
             left_out_count: 0,
             missing: 0,
+            comments: 0,
             alike: None,
         }
     }
@@ -70,8 +75,9 @@ impl Account {
     pub(crate) fn described(&self, missing: &[String]) -> Vec<String> {
         let (first, last) = self.lines.unwrap_or_default();
         let mean = self.sum / self.count as f64;
+        let guess = if self.is_unit_guessed { ", a guess from their size" } else { "" };
         let mut said = vec![format!(
-            "{} velocities from line {first} to {last}, {}, mean {mean:.1} m/s",
+            "{} velocities from line {first} to {last}, {}{guess}), mean {mean:.1} m/s",
             self.count, self.column
         )];
         if self.left_out_count > 0 {
@@ -91,6 +97,11 @@ impl Account {
             let are = if self.missing == 1 { "is" } else { "are" };
             let missing = rows(self.missing as usize);
             said.push(format!("{missing} {are} left out: the velocity is {}", texts.join(" or ")));
+        }
+        if self.comments > 0 {
+            let lines = if self.comments == 1 { "line begins" } else { "lines begin" };
+            let are = if self.comments == 1 { "is" } else { "are" };
+            said.push(format!("{} {lines} with # and {are} not read", self.comments));
         }
         if self.errors > 0 {
             said.push(format!("the errors behind {} of the velocities are not used", self.errors));

@@ -3,7 +3,7 @@
 use osteon_common::check::{DECAY, VELOCITY};
 use osteon_common::parameters::Parameter;
 
-use super::choice::ColumnChoice;
+use super::column_choice::ColumnChoice;
 use super::encodings::normalised;
 use super::number::CellNumber;
 use super::problem::{Problem, shortened};

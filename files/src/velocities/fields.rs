@@ -3,12 +3,23 @@
 use super::csv_format::Separator;
 use super::problem::Problem;
 
+/// Marks with which programs begin a comment.
+pub(super) const COMMENT_MARKS: [char; 5] = ['#', '%', '!', '*', '/'];
+
 /// Returns the fields of one line, without surrounding space and quotes.
 pub(super) fn csv_fields(line: &str, separator: Separator) -> Result<Vec<String>, Problem> {
     match separator.character() {
         Some(character) => separated(line, character),
         None => blank_separated(line, if separator == Separator::Space { 1 } else { 2 }),
     }
+}
+
+/// Returns fields without empty ones at the end beyond a count.
+pub(super) fn trimmed(mut fields: Vec<String>, count: usize) -> Vec<String> {
+    while fields.len() > count && fields.last().is_some_and(String::is_empty) {
+        fields.pop();
+    }
+    fields
 }
 
 fn separated(line: &str, separator: char) -> Result<Vec<String>, Problem> {

@@ -11,7 +11,9 @@ use hdf5_reader::{Dataset, Hdf5File, OpenOptions};
 use osteon_common::limits;
 
 use super::content::{Content, NumberColumn, tables_of};
-use super::problem::Problem;
+use super::names::ColumnName;
+use super::problem::{Problem, shortened};
+use super::units;
 
 const WHAT: &str = "an HDF5 or MATLAB 7.3 file";
 /// Most data sets that are looked at.
@@ -21,6 +23,9 @@ const DEPTH_MAX: usize = 4;
 /// Attribute by which MATLAB says what an array was, and its value for text.
 const CLASS: &str = "MATLAB_class";
 const CLASS_OF_TEXT: &str = "char";
+/// Attributes that change what the numbers of a data set are, and that of their unit.
+const OF_VALUES: [&str; 4] = ["scale_factor", "add_offset", "_FillValue", "missing_value"];
+const UNITS: &str = "units";
 
 /// Returns a table of the file's vectors for each length.
 pub(super) fn tables(bytes: Vec<u8>) -> Result<Vec<Content>, Problem> {
@@ -33,8 +38,11 @@ pub(super) fn tables(bytes: Vec<u8>) -> Result<Vec<Content>, Problem> {
         .with_chunk_cache_bytes(1 << 20);
     let file =
         Hdf5File::from_shared_bytes_with_options(Arc::from(bytes), options).map_err(damaged)?;
-    let mut found = Vectors { columns: Vec::new(), bytes: 0, looked_at: 0 };
+    let mut found = Vectors { columns: Vec::new(), bytes: 0, looked_at: 0, problem: None };
     found.group(&file.root_group().map_err(damaged)?, "", 0).map_err(damaged)?;
+    if let Some(problem) = found.problem {
+        return Err(problem);
+    }
     if found.columns.is_empty() {
         return Err(Problem::NoVectors { what: WHAT });
     }
@@ -46,6 +54,8 @@ struct Vectors {
     columns: Vec<NumberColumn>,
     bytes: usize,
     looked_at: usize,
+    /// Why velocities are refused: an attribute of theirs changes their numbers, or names another unit.
+    problem: Option<Problem>,
 }
 
 impl Vectors {
@@ -65,6 +75,7 @@ impl Vectors {
                 && !is_text(&dataset)
                 && let Some(numbers) = numbers(&dataset)
             {
+                self.problem = self.problem.take().or(attribute_of_values(&dataset, name));
                 self.columns.push(NumberColumn { name: format!("{path}{name}"), numbers });
             }
         }
@@ -81,6 +92,18 @@ impl Vectors {
 
 fn last_part(name: &str) -> &str {
     name.rsplit('/').next().unwrap_or(name)
+}
+
+/// Returns the attribute by which the numbers of a data set of velocities are none in m/s, as they stand.
+fn attribute_of_values(dataset: &Dataset, name: &str) -> Option<Problem> {
+    let is_of_velocities = ColumnName::parse(name).is_of_velocities();
+    let found = OF_VALUES.into_iter().find(|attribute| dataset.attribute(attribute).is_ok());
+    let unit = dataset.attribute(UNITS).and_then(|attribute| attribute.read_string()).ok();
+    let is_other = |unit: &String| units::of_velocity(unit).is_none() && !unit.trim().is_empty();
+    let found = found.or(unit.filter(is_other).map(|_| UNITS));
+    found
+        .filter(|_| is_of_velocities)
+        .map(|attribute| Problem::Attribute { name: shortened(name), attribute })
 }
 
 fn is_text(dataset: &Dataset) -> bool {

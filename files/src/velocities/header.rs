@@ -1,11 +1,12 @@
 //! Where a table begins in a text: the line with the names of its columns, and what separates them.
 
 use super::content::Content;
-use super::csv_format::{CsvFormat, DecimalMark, Separator};
-use super::fields::csv_fields;
+use super::csv_format::{CsvFormat, Separator};
+use super::fields::{COMMENT_MARKS, csv_fields, trimmed};
 use super::names::ColumnName;
-use super::number::CellNumber;
-use super::problem::{LocatedProblem, Problem};
+use super::number::is_number;
+use super::problem::{COLUMN, LocatedProblem, Problem};
+use super::row_names;
 use super::text_lines::{TextRecord, TextRecords};
 use super::units::{self, NamedUnit};
 
@@ -13,14 +14,16 @@ use super::units::{self, NamedUnit};
 const RECORDS_MAX: usize = 1000;
 /// Most columns of a table whose header is to be found.
 const COLUMNS_MAX: usize = 1000;
+/// Words for a value that is missing, in lower case; others have no two letters in a row.
+const GAPS: [&str; 12] = [
+    "na", "nan", "null", "none", "nil", "missing", "nd", "inf", "div/0", "value", "false", "failed",
+];
 /// Most different headers that are looked at.
 const HEADERS_MAX: usize = 20;
 /// Most lines between the header and the first row: units, and rules.
 const BETWEEN_MAX: usize = 3;
 /// Rows whose first fields tell whether these are names that the header does not have.
 const ROW_NAMES: usize = 50;
-/// Marks with which programs begin a comment.
-const COMMENT_MARKS: [char; 5] = ['#', '%', '!', '*', '/'];
 
 /// Names of the columns, and where their rows begin.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,11 +56,6 @@ pub(super) fn fields_of(record: &TextRecord<'_>, separator: Separator) -> Vec<St
     csv_fields(record.text, separator).unwrap_or_else(|_| vec![record.text.trim().to_owned()])
 }
 
-/// Returns whether a cell is a number, with either decimal mark.
-pub(super) fn is_number(cell: &str) -> bool {
-    DecimalMark::ALL.into_iter().any(|mark| CellNumber::read(cell, mark).is_some())
-}
-
 /// Returns whether fields are the units of columns rather than values of a row, given the places of
 /// velocities.
 pub(super) fn are_units(fields: &[String], places: &[usize]) -> bool {
@@ -85,8 +83,9 @@ fn names_in(text: &str, separator: Separator) -> Result<Vec<String>, Problem> {
     // A name over several lines has one blank between them.
     let one_line = |name: String| name.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut names: Vec<String> = names.into_iter().map(one_line).collect();
+    // A mark that stands alone is the name of a column of numbers.
     if uncommented.len() < text.len() && names.len() > 1 && names[0].is_empty() {
-        names.remove(0);
+        text[..text.len() - uncommented.len()].clone_into(&mut names[0]);
     }
     Ok(names)
 }
@@ -94,26 +93,22 @@ fn names_in(text: &str, separator: Separator) -> Result<Vec<String>, Problem> {
 /// Returns the header where the keys say that it is: in the first line that is neither empty nor a
 /// comment, if none says more.
 fn given(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem> {
-    let named = content.separator().or(format.separator);
+    // What the first line says holds for every header, however it is found.
+    let above = above_of(&content.text);
+    let named = content.separator().or(format.separator).or(above);
     let skipped = match format.header_line {
         Some(line) => line.saturating_sub(1),
         None => format.skip_lines.unwrap_or(0),
     };
-    let mut above = None;
     let records = TextRecords::split(&content.text, named.unwrap_or_default()).skip_lines(skipped);
     for record in records {
         let record = record?;
         let is_named = format.header_line == Some(record.line);
-        if !is_named && (record.is_blank() || record.is_comment()) {
+        let says_separator = above.is_some() && Separator::of_first_line(record.text).is_some();
+        if !is_named && (record.is_blank() || record.is_comment() || says_separator) {
             continue;
         }
-        if above.is_none() && format.header_line.is_none() {
-            above = Separator::of_first_line(record.text);
-            if above.is_some() {
-                continue;
-            }
-        }
-        let separator = named.or(above).unwrap_or_default();
+        let separator = named.unwrap_or_default();
         let located = |problem| (Some(record.line), problem);
         if format.header_line == Some(0) {
             let count = csv_fields(record.text, separator).map_err(located)?.len();
@@ -126,68 +121,26 @@ fn given(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
                 is_separator_usual: named.is_none(),
             });
         }
-        let header = Header {
+        let mut header = Header {
             line: record.line,
             lines_above: record.line + record.text.matches('\n').count(),
             separator,
             names: names_in(record.text, separator).map_err(located)?,
             is_separator_usual: format.separator.is_none(),
         };
-        let is_quoted = record.text.contains('"');
-        return Ok(with_row_names(header, &content.text, is_quoted));
+        let rows: Vec<_> = header
+            .rows(&content.text)
+            .map_while(Result::ok)
+            .filter(|record| !record.is_blank() && !record.is_comment())
+            .take(ROW_NAMES)
+            .map(|record| (record, fields_of(&record, separator)))
+            .collect();
+        let column = format.column.as_deref().unwrap_or(COLUMN);
+        let place = header.names.iter().position(|name| name == column);
+        row_names::adapt(&mut header.names, &record, separator, &rows, place.as_slice());
+        return Ok(header);
     }
     Err((None, Problem::Empty))
-}
-
-/// Returns a header with a nameless first column, if each row begins with a name that the header does not
-/// have, as R writes it.
-fn with_row_names(mut header: Header, text: &str, is_quoted: bool) -> Header {
-    let rows: Vec<Vec<String>> = header
-        .rows(text)
-        .map_while(Result::ok)
-        .filter(|record| !record.is_blank() && !record.is_comment())
-        .take(ROW_NAMES)
-        .map(|record| trimmed(fields_of(&record, header.separator), header.names.len() + 1))
-        .collect();
-    if has_row_names(&header.names, header.separator, is_quoted, &rows) {
-        header.names.insert(0, String::new());
-    }
-    header
-}
-
-/// Returns fields without empty ones at the end beyond a count.
-pub(super) fn trimmed(mut fields: Vec<String>, count: usize) -> Vec<String> {
-    while fields.len() > count && fields.last().is_some_and(String::is_empty) {
-        fields.pop();
-    }
-    fields
-}
-
-/// Returns whether rows have one field more than the header, and their first fields are names of rows: all
-/// different, and counted from one number on, or no numbers.
-fn has_row_names(
-    names: &[String],
-    separator: Separator,
-    is_quoted: bool,
-    rows: &[Vec<String>],
-) -> bool {
-    // An unquoted comma within numbers makes one field more, too.
-    let is_certain = is_quoted || separator != Separator::Comma;
-    let is_longer = |row: &Vec<String>| {
-        row.len() == names.len() + 1 && row.last().is_some_and(|last| !last.is_empty())
-    };
-    if !is_certain || rows.is_empty() || !rows.iter().all(is_longer) {
-        return false;
-    }
-    let first: Vec<&str> = rows.iter().map(|row| row[0].as_str()).collect();
-    let numbers: Vec<i64> = first.iter().filter_map(|name| name.parse().ok()).collect();
-    let is_counted =
-        numbers.len() == first.len() && numbers.windows(2).all(|pair| pair[1] == pair[0] + 1);
-    let mut different = first.clone();
-    different.sort_unstable();
-    different.dedup();
-    let are_names = first.iter().all(|name| !is_number(name)) && different.len() == first.len();
-    is_counted || are_names
 }
 
 /// Finds the header by what it says, with every separator that may be.
@@ -210,7 +163,8 @@ fn found(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
             keep_better(&mut fallback, score, header);
         }
     }
-    let is_best = best.is_some();
+    // Any line is a table of one column.
+    let is_best = best.as_ref().is_some_and(|(_, header): &(Fit, Header)| header.names.len() > 1);
     if let (false, Some(problem)) = (is_best, first_problem) {
         return Err(problem);
     }
@@ -293,7 +247,7 @@ impl<'a> Beginning<'a> {
             let score = self.rows_below(at, &header, &places, self.records.len());
             if let Some((before, _, other, _)) = found.last() {
                 let places = velocity_places(&other.names);
-                if self.rows_below(*before, other, &places, at) > 1 {
+                if self.rows_below(*before, other, &places, at) > 0 {
                     let (first, second) = (other.line, header.line);
                     return Err((Some(second), Problem::TwoTables { first, second }));
                 }
@@ -319,22 +273,33 @@ impl<'a> Beginning<'a> {
         {
             return None;
         }
-        let rows: Vec<Vec<String>> = self.below(at, &names).take(ROW_NAMES).collect();
+        let rows: Vec<_> = self.below(at, &names).take(ROW_NAMES).collect();
         let mut header = self.header_at(at, names);
-        if has_row_names(&header.names, self.separator, record.text.contains('"'), &rows) {
-            header.names.insert(0, String::new());
-        }
         let places = velocity_places(&header.names);
-        let is_row = |row: &&Vec<String>| {
+        row_names::adapt(&mut header.names, record, self.separator, &rows, &places);
+        let places = velocity_places(&header.names);
+        let is_row = |(_, row): &&(TextRecord<'_>, Vec<String>)| {
             row.len() == header.names.len()
                 && places.iter().any(|&place| is_number(&row[place]) || is_gap(&row[place]))
         };
         let matching = rows.iter().filter(is_row).count();
-        (matching > 0 && 3 * matching >= rows.len()).then_some((header, places))
+        // A table of one row may stand above another.
+        let is_next = rows.first().is_some_and(|row| {
+            is_row(&row) && places.iter().any(|&place| row_names::is_like_velocity(&row.1[place]))
+        });
+        // Blanks within names make columns of their units.
+        let is_torn = self.separator.character().is_none()
+            && header.names.iter().any(|name| is_velocity_unit(name));
+        let is_table = matching > 0 && 3 * matching >= rows.len() || is_next;
+        (is_table && !is_torn).then_some((header, places))
     }
 
-    /// Returns the fields of the records below a header that may be rows: not comments, rules, or units.
-    fn below(&self, at: usize, names: &[String]) -> impl Iterator<Item = Vec<String>> {
+    /// Returns the records below a header that may be rows, with their fields: not comments, rules, or units.
+    fn below(
+        &self,
+        at: usize,
+        names: &[String],
+    ) -> impl Iterator<Item = (TextRecord<'a>, Vec<String>)> {
         let (count, places) = (names.len(), velocity_places(names));
         let below = self.records[at + 1..].iter().enumerate();
         below
@@ -343,7 +308,7 @@ impl<'a> Beginning<'a> {
                     *behind < BETWEEN_MAX && (is_rule(fields) || are_units(fields, &places));
                 !is_between && !record.is_comment()
             })
-            .map(move |(_, (_, fields))| trimmed(fields.clone(), count))
+            .map(move |(_, (record, fields))| (*record, trimmed(fields.clone(), count)))
     }
 
     /// Returns how many records between a header and another place have numbers in one of its columns of
@@ -401,9 +366,12 @@ impl<'a> Beginning<'a> {
     }
 }
 
-/// Returns whether a cell has no value.
-fn is_gap(cell: &str) -> bool {
-    cell.is_empty() || ["-", "--", "NA", "N/A", "NaN", "nan"].contains(&cell)
+/// Returns whether a cell has no value, as people and programs say it.
+pub(super) fn is_gap(cell: &str) -> bool {
+    let cell = cell.to_lowercase();
+    let mut letters = cell.split(|c: char| !c.is_alphanumeric());
+    GAPS.contains(&cell.trim_matches(|c: char| !c.is_alphanumeric()))
+        || letters.all(|word| word.chars().count() < 2)
 }
 
 /// Returns the places of names that are of velocities, and not only a unit.

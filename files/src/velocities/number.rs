@@ -13,8 +13,8 @@ use super::units;
 const CHARACTERS_MAX: usize = 80;
 /// Digits between two marks of thousands.
 const GROUP_DIGITS: usize = 3;
-/// Fewest nines that are a mark.
-const NINES: usize = 3;
+/// Fewest equal digits that are a mark.
+const REPEATED_MIN: usize = 3;
 /// What stands between a value and its error.
 const BEFORE_ERROR: [&str; 3] = ["\u{b1}", "+/-", "+-"];
 
@@ -30,6 +30,11 @@ pub(super) struct CellNumber {
     pub(super) unit: Option<VelocityUnit>,
     /// Whether an error follows it.
     pub(super) has_error: bool,
+}
+
+/// Returns whether a cell is a number, with either decimal mark.
+pub(super) fn is_number(cell: &str) -> bool {
+    DecimalMark::ALL.into_iter().any(|mark| CellNumber::read(cell, mark).is_some())
 }
 
 impl CellNumber {
@@ -61,12 +66,11 @@ impl CellNumber {
         &self.text
     }
 
-    /// Returns whether it has only nines, by which programs mark that there is no value.
-    pub(super) fn is_nines(&self) -> bool {
-        let whole = self.digits.split('.').next().unwrap_or_default();
-        whole.len() >= NINES
-            && self.digits.bytes().all(|byte| matches!(byte, b'9' | b'.' | b'0'))
-            && whole.bytes().all(|byte| byte == b'9')
+    /// Returns whether it is one digit again and again, by which programs mark that there is no value.
+    pub(super) fn is_repeated(&self) -> bool {
+        let mut digits = self.digits.trim_end_matches(".0").bytes().filter(u8::is_ascii_digit);
+        let Some(first) = digits.next() else { return false };
+        digits.clone().count() + 1 >= REPEATED_MIN && digits.all(|digit| digit == first)
     }
 
     /// Returns the number, in the unit of its cell.
@@ -88,6 +92,11 @@ impl CellNumber {
         let power = self.unit.unwrap_or(unit).power();
         let power = self.exponent.saturating_add(power).saturating_sub(decimals);
         0.5 * format!("1e{power}").parse::<f64>().unwrap_or(f64::INFINITY)
+    }
+
+    /// Returns whether it is written more finely than numbers that are rounded so.
+    pub(super) fn has_more_decimals(&self, rounding: f64, unit: VelocityUnit) -> bool {
+        self.rounding(unit) < 0.9 * rounding
     }
 
     fn scaled(&self, power: i32) -> f64 {

@@ -6,6 +6,7 @@ use osteon_common::check::VELOCITY;
 use osteon_common::{limits, visible};
 use thiserror::Error;
 
+use super::column_choice::POSSIBLE;
 use super::csv_format::DecimalMark;
 
 /// The column of the velocities, if no key names another.
@@ -19,7 +20,7 @@ pub(super) type LocatedProblem = (Option<usize>, Problem);
 /// A fault. Its message completes a sentence that begins with the file or the line.
 #[derive(Debug, Error)]
 pub(crate) enum Problem {
-    #[error("cannot be read: {0} (its path is relative to the job file)")]
+    #[error("cannot be read: {0}")]
     Unreadable(io::Error),
     #[error("is longer than {} bytes", limits::FILE_BYTES_MAX)]
     TooLarge,
@@ -36,6 +37,11 @@ pub(crate) enum Problem {
     UnpackedTooLarge { bytes: u64 },
     #[error("is {what} without a vector of numbers; save the velocities as one, or as CSV")]
     NoVectors { what: &'static str },
+    #[error(
+        "has the data set `{name}` with the attribute {attribute:?}, which is not read: write the velocities as they are, in \
+         m/s and without it, or as CSV"
+    )]
+    Attribute { name: String, attribute: &'static str },
     #[error("has a character 0 inside of the line, which is no text; the file is damaged")]
     Nul,
     #[error(
@@ -84,6 +90,60 @@ pub(crate) enum Problem {
         "the column `{column}` has another unit of velocity than m/s, km/s and mm/us; convert it to one of these"
     )]
     OtherUnit { column: String },
+    #[error(
+        "the unit of the column `{column}` is none of velocities that is known; if it has these, say it: [data] column = \
+         {column:?}, unit = \"m/s\""
+    )]
+    UnknownUnit { column: String },
+    #[error(
+        "the column of units has {found:?}; write all velocities in one unit: m/s, km/s or mm/us ([data] unit)"
+    )]
+    UnitBeside { found: String },
+    #[error(
+        "begins with {found:?}: if it is a comment, begin it with # (such lines are not read), and otherwise delete \
+         that mark"
+    )]
+    LikeComment { found: String },
+    #[error(
+        "the numbers of the column `{column}` are counted one by one, and no velocities; say which column has \
+         these: [data] column = \"…\""
+    )]
+    Counted { column: String },
+    #[error(
+        "each line may be one number with a decimal comma, or two: [data] decimal = \",\", separator = \";\" if it is \
+         one, and otherwise write a name for each column"
+    )]
+    OneOrTwoNumbers,
+    #[error(
+        "the velocity is {found:?}, and {next:?} behind it may be its decimals: quote such numbers, or separate the \
+         fields by semicolons: [data] separator = \";\", decimal = \",\""
+    )]
+    SplitNumber { found: String, next: String },
+    #[error(
+        "the velocities are whole numbers (median {median}), and their decimals may stand in the next column: quote \
+         such numbers, or separate the fields by semicolons: [data] separator = \";\""
+    )]
+    WholeNumbers { median: f64 },
+    #[error(
+        "has {found:?}, so that rows say what they are of: write the velocities of bone into a column of their own, and \
+         name it: [data] column = \"…\""
+    )]
+    NamedInRows { found: String },
+    #[error(
+        "the column `{column}` has {found:?} directly below its name: write a header of one line; or if that stands for \
+         a missing value: [data] missing = [{found:?}]"
+    )]
+    NameBelow { column: String, found: String },
+    #[error(
+        "velocity is {found:?}: if the sign is a direction, leave it out in the file; if it stands for a missing \
+         value: [data] missing = [{found:?}]"
+    )]
+    Negative { found: String },
+    #[error(
+        "velocity is {found:?}, far from the others, as a code for a missing value is: if it is one, [data] missing = \
+         [{found:?}]; otherwise write it with decimals"
+    )]
+    LikeCode { found: String },
     #[error(
         "the column `{column}` has the median {median} where its unit is {unit}: no velocity of bone; say which \
          is wrong: [data] unit = \"m/s\" or \"km/s\" (or column = \"…\")"
@@ -161,6 +221,13 @@ pub(crate) enum Problem {
     NotANumber { found: String, decimal: Option<DecimalMark>, is_missing: bool },
     #[error("velocity {}", VELOCITY.refusal(*.found))]
     Refused { found: f64 },
+    #[error(
+        "velocity is {found:?} m/s; no velocity of sound in bone is outside {} to {} (m/s): correct it in the file, or \
+         if that stands for a missing value: [data] missing = [\"…\"]",
+        POSSIBLE.start,
+        POSSIBLE.end
+    )]
+    Impossible { found: f64 },
     #[error("has no rows; a coefficient of variation needs at least two velocities")]
     NoRows,
     #[error("has one velocity; a coefficient of variation needs at least two")]
@@ -191,6 +258,18 @@ impl Problem {
                 | Self::FieldCount { .. }
                 | Self::NotANumber { decimal: None, is_missing: false, .. }
                 | Self::NotUtf8
+        )
+    }
+
+    /// Returns whether it says that there are no velocities, rather than that they are not understood.
+    pub(super) fn is_no_table(&self) -> bool {
+        matches!(
+            self,
+            Self::NoVelocities { .. }
+                | Self::DistanceAndTime { .. }
+                | Self::Empty
+                | Self::OnlyNumbers
+                | Self::NoRowsBelow
         )
     }
 

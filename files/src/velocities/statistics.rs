@@ -185,7 +185,8 @@ impl SummaryLabel {
             return None;
         }
         let is_word = |word: &&str| WORDS.iter().any(|(_, list)| list.contains(word));
-        let is_alone = || words.iter().all(|word| is_word(word) || word.parse::<f64>().is_ok());
+        // "SD-01" is a specimen.
+        let is_alone = || words.iter().all(is_word);
         let (first, last) = (*words.first()?, *words.last()?);
         // In "standard deviation" the word that counts is not the first.
         let of_word = |word: &str| {

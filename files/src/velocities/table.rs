@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::choice::{ColumnChoice, POSSIBLE};
+use super::choice;
+use super::column_choice::{ColumnChoice, POSSIBLE};
 use super::content::Content;
 use super::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
 use super::encodings::normalised;
@@ -12,6 +13,7 @@ use super::number::CellNumber;
 use super::opening;
 use super::problem::{COLUMN, LocatedProblem, Problem, listed, shortened};
 use super::summaries::{self, Summaries};
+use super::units::NamedUnit;
 
 /// The table of a file: its text, and how it is read.
 #[derive(Debug)]
@@ -42,6 +44,7 @@ impl VelocityTable {
         // Of several tables, the one that has velocities.
         let mut understood = None;
         let mut first_problem = None;
+        let mut broken = None;
         for content in [first, second].into_iter().chain(contents) {
             match (Self::from_content(content, format), &understood) {
                 (Ok(table), None) => understood = Some(table),
@@ -51,8 +54,15 @@ impl VelocityTable {
                         Problem::SeveralTables { first: other.origin(), second: table.origin() },
                     ));
                 }
-                (Err(problem), _) => first_problem = first_problem.or(Some(problem)),
+                (Err(problem), _) if problem.1.is_no_table() || !format.is_found_out => {
+                    first_problem = first_problem.or(Some(problem));
+                }
+                (Err(problem), _) => broken = broken.or(Some(problem)),
             }
+        }
+        // A table of velocities that cannot be read is not replaced by another.
+        if let Some(problem) = broken {
+            return Err(problem);
         }
         understood.ok_or_else(|| first_problem.unwrap_or((None, Problem::Empty)))
     }
@@ -67,7 +77,7 @@ impl VelocityTable {
         let format = if content.separator().is_some() { &of_table } else { format };
         let header = Header::find(&content, format)?;
         let choice = match format.is_found_out {
-            true => ColumnChoice::found(&content.text, &header, format)?,
+            true => choice::find_column(&content.text, &header, format)?,
             false => {
                 let at_header = |problem| (Some(header.line).filter(|&line| line > 0), problem);
                 let place = given_place(&header, format).map_err(at_header)?;
@@ -136,8 +146,8 @@ impl VelocityTable {
     pub(crate) fn has_lines_above(&self) -> bool {
         let above = self.content.text.lines().take(self.header.line.saturating_sub(1));
         let mut above = above.filter(|line| {
-            let line = line.trim();
-            !line.is_empty() && !line.starts_with('#') && Separator::of_first_line(line).is_none()
+            let is_said = line.trim().is_empty() || line.trim_start().starts_with('#');
+            !is_said && Separator::of_first_line(line).is_none()
         });
         let header = self.content.text.lines().nth(self.header.line.saturating_sub(1));
         above.next().is_some() || header.is_some_and(|line| line.trim_start().starts_with('#'))
@@ -155,34 +165,40 @@ impl VelocityTable {
             && !fields.iter().any(is_possible)
     }
 
+    /// Returns how a job says that the file is written: only what is not as documented.
+    pub(crate) fn format(&self) -> CsvFormat {
+        let name = self.header.names.get(self.choice.place).cloned().unwrap_or_default();
+        let (unit, decimal) = (self.unit(), self.decimal());
+        CsvFormat {
+            header_line: self.has_lines_above().then_some(self.header.line),
+            column: (name != COLUMN).then_some(name),
+            unit: (unit != VelocityUnit::default()).then_some(unit),
+            separator: (!self.is_separator_usual()).then_some(self.separator()),
+            decimal: (decimal != DecimalMark::default()).then_some(decimal),
+            encoding: self.content.encoding,
+            missing: Some(self.missing().to_vec()).filter(|texts| !texts.is_empty()),
+            ..CsvFormat::default()
+        }
+    }
+
     /// Returns the keys of `[data]` that say how the file is written, with their values as in a job file.
     pub(crate) fn keys(&self) -> Vec<(&'static str, String)> {
         let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
-        let mut keys = Vec::new();
-        if self.has_lines_above() {
-            keys.push(("header_line", self.header.line.to_string()));
-        }
-        let name = self.header.names.get(self.choice.place).map_or("", String::as_str);
-        if name != COLUMN {
-            keys.push(("column", quoted(name)));
-        }
-        if self.unit() != VelocityUnit::default() {
-            keys.push(("unit", quoted(self.unit().name())));
-        }
-        if !self.is_separator_usual() {
-            keys.push(("separator", quoted(self.separator().name())));
-        }
-        if self.decimal() != DecimalMark::default() {
-            keys.push(("decimal", quoted(self.decimal().name())));
-        }
-        if let Some(encoding) = self.encoding() {
-            keys.push(("encoding", quoted(&encoding)));
-        }
-        if !self.missing().is_empty() {
-            let texts: Vec<_> = self.missing().iter().map(|text| quoted(text)).collect();
-            keys.push(("missing", format!("[{}]", texts.join(", "))));
-        }
-        keys
+        let list = |texts: &Vec<String>| {
+            let texts: Vec<_> = texts.iter().map(|text| quoted(text)).collect();
+            format!("[{}]", texts.join(", "))
+        };
+        let format = self.format();
+        let keys = [
+            ("header_line", format.header_line.map(|line| line.to_string())),
+            ("column", format.column.as_deref().map(quoted)),
+            ("unit", format.unit.map(|unit| quoted(unit.name()))),
+            ("separator", format.separator.map(|separator| quoted(separator.name()))),
+            ("decimal", format.decimal.map(|decimal| quoted(decimal.name()))),
+            ("encoding", self.encoding().as_deref().map(quoted)),
+            ("missing", format.missing.as_ref().map(list)),
+        ];
+        keys.into_iter().filter_map(|(key, value)| Some((key, value?))).collect()
     }
 
     /// Returns how the file is written, for people.
@@ -244,11 +260,14 @@ fn check_units(text: &str, header: &Header, choice: &ColumnChoice) -> Result<(),
     else {
         return Ok(());
     };
-    let power = |unit: VelocityUnit| unit.power();
     match units.get(choice.place).copied().flatten() {
-        Some(unit) if power(unit) != power(choice.unit) => {
+        Some(NamedUnit::Velocity(unit)) if unit.power() != choice.unit.power() => {
             Err((Some(line), Problem::UnitBelow { found: unit.name(), given: choice.unit.name() }))
         }
-        _ => Ok(()),
+        Some(NamedUnit::Velocity(_)) | None => Ok(()),
+        Some(_) => {
+            let column = header.names.get(choice.place).map_or("", String::as_str);
+            Err((Some(line), Problem::UnknownUnit { column: shortened(column) }))
+        }
     }
 }

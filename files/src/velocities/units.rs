@@ -13,12 +13,18 @@ pub(super) enum NamedUnit {
     OtherVelocity,
     /// A unit of something else.
     Other,
+    /// A text at the place of a unit that is no unit known here.
+    Unknown,
 }
 
-const LENGTHS: [&str; 8] = ["km", "mm", "cm", "dm", "um", "ft", "in", "m"];
+const LENGTHS: [&str; 9] = ["km", "mm", "cm", "dm", "um", "kft", "ft", "in", "m"];
+/// How people write a factor of thousand before a unit, without blanks and powers.
+const THOUSAND: [&str; 7] = ["103", "x103", "\u{d7}103", "1000", "x1000", "\u{d7}1000", "1e3"];
 const TIMES: [&str; 6] = ["us", "ms", "ns", "min", "s", "h"];
 /// Units of other quantities.
-const OTHERS: [&str; 65] = [
+const OTHERS: [&str; 67] = [
+    "rpm",
+    "1/min",
     "us",
     "ms",
     "ns",
@@ -144,7 +150,12 @@ pub(super) fn of_text(text: &str) -> Option<NamedUnit> {
         "m/s" | "mps" => Some(NamedUnit::Velocity(VelocityUnit::MetrePerSecond)),
         "km/s" => Some(NamedUnit::Velocity(VelocityUnit::KilometrePerSecond)),
         "mm/us" => Some(NamedUnit::Velocity(VelocityUnit::MillimetrePerMicrosecond)),
+        "mph" | "fps" | "kmh" | "kph" => Some(NamedUnit::OtherVelocity),
         other => {
+            let is_thousand = |factor: &str| other.strip_prefix(factor) == Some("m/s");
+            if THOUSAND.iter().any(|factor| is_thousand(factor)) {
+                return Some(NamedUnit::Velocity(VelocityUnit::KilometrePerSecond));
+            }
             let parts = other.split_once('/');
             let is_velocity = parts
                 .is_some_and(|(length, time)| LENGTHS.contains(&length) && TIMES.contains(&time));
@@ -170,7 +181,9 @@ fn shortened(text: &str) -> String {
     }
     let text: String = text
         .chars()
-        .filter(|c| !c.is_whitespace() && !['^', '*', '\u{b7}', '.'].contains(c))
+        .filter(|c| {
+            !c.is_whitespace() && !['^', '*', '\u{b7}', '.', '{', '}', '\\', '$'].contains(c)
+        })
         .collect();
     if let Some(powers) = text.strip_suffix("-1") {
         for length in LENGTHS {

@@ -79,7 +79,21 @@ fn sheet(workbook: &mut Xlsx<Cursor<Vec<u8>>>, name: &str) -> Result<String, cal
             break;
         }
     }
-    Ok(text + "\n")
+    Ok(padded(text + "\n"))
+}
+
+/// Returns rows with as many fields as the longest has: empty cells at the end are not in the file.
+fn padded(text: String) -> String {
+    let tabs = |line: &str| line.bytes().filter(|&byte| byte == b'\t').count();
+    let longest = text.lines().map(tabs).max().unwrap_or(0);
+    if longest.saturating_mul(text.lines().count()) > limits::FILE_BYTES_MAX as usize {
+        return text;
+    }
+    let pad = |line: &str| match line.is_empty() {
+        true => "\n".to_owned(),
+        false => format!("{line}{}\n", "\t".repeat(longest - tabs(line))),
+    };
+    text.lines().map(pad).collect()
 }
 
 /// Returns the text of a cell; numbers with a decimal point, and dates as none.
