@@ -26,12 +26,13 @@ use osteon_common::outcome::{FailureKind, Outcome};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::Ensemble;
 use osteon_files::job_file;
+use osteon_files::report::ResultFile;
 use osteon_proto::connection::{connect, jobs_client};
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{FetchRequest, JobState, SubmitRequest, WatchRequest};
-use osteon_proto::{results, specification};
+use osteon_proto::{history, specification};
 use osteon_solver::{Solver, Workspace};
 use tonic::transport::Channel;
 
@@ -212,10 +213,12 @@ async fn left(client: &mut JobsClient<Channel>, job: &str) -> Result<(Vec<Point>
     let (mut points, mut digest) = (Vec::new(), None);
     while let Some(message) = parts.message().await? {
         match message.part {
-            Some(Part::Result(result)) => digest = Some(result.digest),
+            Some(Part::Result(result)) => {
+                digest = Some(ResultFile::from_json(&result.json)?.digest().to_owned());
+            }
             Some(Part::History(block)) => {
                 for row in &block.rows {
-                    points.push(results::evaluation_from_message(row)?.point);
+                    points.push(history::evaluation_from_message(row)?.point);
                 }
             }
             _ => {}

@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result, bail};
 use osteon_common::job::JobSpecification;
+use osteon_files::report::ResultFile;
 use osteon_proto::connection::{connect, jobs_client};
 use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{FetchRequest, JobState, JobStatus, SubmitRequest, WatchRequest};
-use osteon_proto::{results, specification};
+use osteon_proto::{history, specification};
 use tokio::time::sleep;
 use tonic::transport::Channel;
 
@@ -150,7 +151,7 @@ impl Client {
                 Some(Part::Result(part)) => result = Some(part),
                 Some(Part::History(block)) => {
                     for row in &block.rows {
-                        let point = results::evaluation_from_message(row)?.point;
+                        let point = history::evaluation_from_message(row)?.point;
                         points.insert(point.0.map(f64::to_bits));
                     }
                 }
@@ -161,7 +162,8 @@ impl Client {
         if result.status() == JobStatus::Failed {
             bail!("job {job} failed: {}", result.reason.unwrap_or_default());
         }
-        let points = points.len() as u64;
-        Ok(Left { digest: result.digest, points, realizations: points * result.realizations })
+        let (result, points) = (ResultFile::from_json(&result.json)?, points.len() as u64);
+        let (digest, realizations) = (result.digest().to_owned(), points * result.realizations());
+        Ok(Left { digest, points, realizations })
     }
 }

@@ -46,7 +46,6 @@ pub(crate) async fn propagate(url: &str, file: &Path) -> Result<(f64, String), B
     };
     client.watch(&id, show).await?;
     let result = client.fetch(&id).await?.result;
-    let best = result.best.ok_or("the job has no result")?;
-    let velocity = best.velocity.ok_or("every realization failed")?;
-    Ok((velocity.moments.mean, result.digest))
+    let mean = result.velocity().moments.mean.ok_or("no realization has a velocity")?;
+    Ok((mean, result.digest().to_owned()))
 }

@@ -43,5 +43,4 @@ pub mod run;
 pub mod run_error;
 #[cfg(test)]
 #[path = "../../src/sample_result.rs"]
-#[expect(dead_code, reason = "the program's tests use the rest of it")]
 mod sample_result;

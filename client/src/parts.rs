@@ -5,13 +5,14 @@ use osteon_common::limits::{DRAWS_ALL_MAX, GROUPS_MAX, REALIZATIONS_MAX};
 use osteon_common::outcome::Outcome;
 use osteon_common::posterior::PosteriorDraw;
 use osteon_common::results::Evaluation;
+use osteon_files::report::{Group, PosteriorReport, ReadError, ResultFile};
+use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::malformed::Malformed;
-use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::{self, DrawBlock, RealizationBlock};
-use osteon_proto::{posterior, realizations, results, specification};
+use osteon_proto::{draws, history, realizations, specification};
 
-use crate::fetched::Fetched;
+use crate::fetched::{Fetched, SetSamples};
 
 /// The parts received so far.
 #[derive(Debug, Default)]
@@ -55,7 +56,7 @@ impl FetchedParts {
             Part::Result(result) => self.result = Some(result),
             Part::History(block) => {
                 for row in &block.rows {
-                    self.history.push(results::evaluation_from_message(row)?);
+                    self.history.push(history::evaluation_from_message(row)?);
                 }
             }
             Part::Group(group) => {
@@ -101,7 +102,7 @@ impl FetchedParts {
     }
 
     fn add_draws(&mut self, block: &DrawBlock) -> Result<(), Malformed> {
-        let (first, draws) = posterior::draws_from_message(block)?;
+        let (first, draws) = draws::draws_from_message(block)?;
         let of_set = match (block.group, self.groups.last_mut()) {
             (None, _) => &mut self.draws,
             (Some(group), Some(found)) if found.message.group == group => &mut found.draws,
@@ -125,22 +126,37 @@ impl FetchedParts {
     pub(crate) fn assemble(self) -> Result<Fetched, Malformed> {
         let specification =
             self.specification.ok_or(Malformed::Missing { field: "specification" })?;
-        let result = self.result.ok_or(Malformed::Missing { field: "result" })?;
-        let all = result.realizations;
-        let groups =
-            self.groups.into_iter().map(|FetchedGroup { message, realizations, draws }| {
-                let outcomes = realizations.assemble(message.best.is_some(), all)?;
-                results::group_from_message(&message, ResultBlocks { outcomes, draws })
+        let specification =
+            specification::from_message(&specification).map_err(Malformed::InvalidSpecification)?;
+        let message = self.result.ok_or(Malformed::Missing { field: "result" })?;
+        let status = JOB_STATUS.required(message.status, "status")?;
+        let mut result = ResultFile::from_json(&message.json).map_err(no_result)?;
+        if result.kind() != specification.kind {
+            let (found, kind) = (result.kind().name(), specification.kind.name());
+            let reason = format!("it is the result of a {found}, and the job is a {kind}");
+            return Err(Malformed::Json { field: "json", reason });
+        }
+        let all = result.realizations();
+        let of_job = SetSamples {
+            outcomes: self.realizations.assemble(result.best_point(None).is_ok(), all)?,
+            draws: drawn(self.draws, result.posterior())?,
+        };
+        let (mut groups, mut samples) = (Vec::new(), Vec::new());
+        for FetchedGroup { message, realizations, draws } in self.groups {
+            let group = Group::from_json(&message.json).map_err(no_result)?;
+            samples.push(SetSamples {
+                outcomes: realizations.assemble(group.best_point().is_some(), all)?,
+                draws: drawn(draws, group.posterior.as_ref())?,
             });
-        let groups = groups.collect::<Result<_, _>>()?;
-        let outcomes = self.realizations.assemble(result.best.is_some(), all)?;
-        let blocks = ResultBlocks { outcomes, draws: self.draws };
-        Ok(Fetched {
-            specification: specification::from_message(&specification)
-                .map_err(Malformed::InvalidSpecification)?,
-            result: results::from_message(&result, blocks, groups)?,
-            history: self.history,
-        })
+            groups.push(group);
+        }
+        if groups.is_empty() {
+            samples.push(of_job);
+        } else if let ResultFile::Identification(found) = &mut result {
+            found.groups = Some(groups);
+        }
+        let Self { history, .. } = self;
+        Ok(Fetched { specification, status, reason: message.reason, result, history, samples })
     }
 }
 
@@ -148,13 +164,31 @@ impl PointOutcomes {
     /// Returns the outcomes, whose number must be `all` if there is a best point, and 0 otherwise.
     fn assemble(self, has_best: bool, all: u64) -> Result<Vec<Outcome>, Malformed> {
         let expected = if has_best { all } else { 0 };
-        if self.count == expected {
-            return Ok(self.outcomes);
-        }
-        let number = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
-        let (found, expected) = (number(self.count), number(expected));
-        Err(Malformed::WrongLength { field: "realizations", found, expected })
+        require_length("realizations", self.count, expected)?;
+        Ok(self.outcomes)
     }
+}
+
+/// Returns the draws, of which there must be as many as the posterior says.
+fn drawn(
+    draws: Vec<PosteriorDraw>,
+    posterior: Option<&PosteriorReport>,
+) -> Result<Vec<PosteriorDraw>, Malformed> {
+    require_length("draws", draws.len() as u64, posterior.map_or(0, |posterior| posterior.draws))?;
+    Ok(draws)
+}
+
+fn require_length(field: &'static str, found: u64, expected: u64) -> Result<(), Malformed> {
+    if found == expected {
+        return Ok(());
+    }
+    let number = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
+    let (found, expected) = (number(found), number(expected));
+    Err(Malformed::WrongLength { field, found, expected })
+}
+
+fn no_result(error: ReadError) -> Malformed {
+    Malformed::Json { field: "json", reason: error.to_string() }
 }
 
 fn out_of_range(field: &'static str, value: f64, allowed: &'static str) -> Malformed {

@@ -55,16 +55,16 @@ pub fn propagation_failure(
 /// Returns the reason why an ended job has no result to show or to keep; `None` if it has one. A
 /// propagation has none until its only evaluation is complete, a search has one from its start.
 pub fn missing_result(fetched: &Fetched) -> Option<String> {
-    if fetched.specification.kind == JobKind::Identification || fetched.result.best.is_some() {
+    if fetched.result.kind() == JobKind::Identification || fetched.result.best_point(None).is_ok() {
         return None;
     }
-    let how = match fetched.result.status {
+    let how = match fetched.status {
         Status::Cancelled => "the job was cancelled before its end",
         Status::Failed | Status::Converged | Status::NotMatched | Status::MaxEvaluations => {
             "the job failed"
         }
     };
-    let reason = fetched.result.reason.as_ref();
+    let reason = fetched.reason.as_ref();
     let reason = reason.map(|reason| format!(": {reason}")).unwrap_or_default();
     Some(format!("{how}; there is no result{reason}"))
 }

@@ -10,12 +10,12 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, anyhow, bail};
-use osteon_common::job::{Data, JobKind, JobSpecification};
+use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::limits::{FILE_BYTES_MAX, REALIZATIONS_MAX};
-use osteon_common::results::{GroupResult, JobResult, Status};
+use osteon_common::results::Status;
 use osteon_common::visible;
 use osteon_files::document::Format;
-use osteon_files::report::ResultFile;
+use osteon_files::report::{Group, ResultFile};
 use osteon_files::{job_file, posterior_csv, results_csv, user_file};
 
 use crate::fetched::Fetched;
@@ -180,53 +180,48 @@ impl ResultsDirectory {
         result_files::write(&self.path.join(JOB), &text).map_err(RunError::Failed)
     }
 
-    /// Writes all files of an ended job, `result.json` last, and returns the result. The listener learns what
-    /// was left out.
+    /// Writes all files of an ended job, `result.json` last. The listener learns what was left out.
     pub fn write_results(
         &self,
-        kind: JobKind,
         fetched: &Fetched,
         listener: &dyn RunListener,
-    ) -> Result<ResultFile, RunError> {
-        let written = ResultFile::from_job(kind, &fetched.result);
+    ) -> Result<(), RunError> {
+        let Fetched { specification, status, result, history, samples, .. } = fetched;
+        let kind = result.kind();
         let write_all = || -> anyhow::Result<()> {
             let mut files = ResultFiles::begin(&self.path)?;
-            files.write(JOB, &job_file::to_toml(&fetched.specification))?;
+            files.write(JOB, &job_file::to_toml(specification))?;
             if kind == JobKind::Identification {
-                let history = results_csv::history(&fetched.specification, &fetched.history);
-                files.write(HISTORY, &history)?;
+                files.write(HISTORY, &results_csv::history(specification, history))?;
             }
-            if fetched.specification.data.as_ref().is_some_and(Data::is_grouped) {
-                let Fetched { result, history, .. } = fetched;
-                let groups = results_csv::groups(&fetched.specification, result, history);
-                files.write(GROUPS, &groups)?;
-                files.write(COMPARISON, &results_csv::comparison(result))?;
+            let groups = result.groups();
+            if !groups.is_empty() {
+                files.write(GROUPS, &results_csv::groups(specification, groups, history))?;
+                files.write(COMPARISON, &results_csv::comparison(groups))?;
             }
             files.write(REALIZATIONS, &realizations(fetched, listener))?;
-            if fetched.specification.posterior.is_some() {
-                let Fetched { specification, result, .. } = fetched;
-                files.write(POSTERIOR, &posterior_csv::posterior(specification, result))?;
+            if specification.posterior.is_some() {
+                let draws = samples.iter().map(|of_set| of_set.draws.as_slice());
+                files.write(POSTERIOR, &posterior_csv::posterior(specification, draws))?;
             }
-            let JobResult { program, digest, seed, .. } = &fetched.result;
-            let (digest, seed) = (Some(digest.as_str()), Some(*seed));
             files.finish(
-                &written.to_json(),
+                &result.to_json(),
                 &ResultOrigin {
                     kind: kind.name(),
-                    program,
-                    digest,
-                    seed,
-                    integrity: written.integrity(),
+                    program: &result.program(),
+                    digest: Some(result.digest()),
+                    seed: Some(result.seed()),
+                    integrity: result.integrity(),
                 },
             )
         };
         write_all().map_err(RunError::Failed)?;
-        if fetched.result.status != Status::Cancelled {
+        if *status != Status::Cancelled {
             // The data for resuming are no longer needed; it does no harm if some remain.
             self.forget_request();
             drop(fs::remove_dir_all(self.store()));
         }
-        Ok(written)
+        Ok(())
     }
 }
 
@@ -269,21 +264,22 @@ pub fn read_named_file(path: &Path) -> Result<Option<String>, RunError> {
 
 /// Returns the table of the realizations at the best point, or at those of the groups.
 fn realizations(fetched: &Fetched, listener: &dyn RunListener) -> String {
-    if fetched.specification.data.as_ref().is_some_and(Data::is_grouped) {
-        let groups = fetched.result.groups.iter();
-        let left_out =
-            |group: &&GroupResult| group.best.as_ref().is_some_and(|best| best.outcomes.is_empty());
-        let left_out = groups.filter(left_out).count();
-        if left_out > 0 {
-            listener.note(&format!(
-                "{REALIZATIONS} is without those of the last {left_out} groups: it has at most \
-                 {REALIZATIONS_MAX} rows"
-            ));
-        }
-        return results_csv::realizations_of_groups(&fetched.result.groups);
+    let Fetched { result, samples, .. } = fetched;
+    let groups = result.groups();
+    if groups.is_empty() {
+        return results_csv::realizations(samples.first().map_or(&[], |of_set| &of_set.outcomes));
     }
-    let best = fetched.result.best.as_ref();
-    results_csv::realizations(best.map(|best| best.outcomes.as_slice()).unwrap_or_default())
+    let tables = || groups.iter().zip(samples.iter().map(|of_set| of_set.outcomes.as_slice()));
+    let is_left_out =
+        |(group, outcomes): &(&Group, &[_])| group.best_point().is_some() && outcomes.is_empty();
+    let left_out = tables().filter(is_left_out).count();
+    if left_out > 0 {
+        listener.note(&format!(
+            "{REALIZATIONS} is without those of the last {left_out} groups: it has at most \
+             {REALIZATIONS_MAX} rows"
+        ));
+    }
+    results_csv::realizations_of_groups(tables().map(|(group, outcomes)| (&*group.name, outcomes)))
 }
 
 /// Returns whether `file` is still the file at `path`.

@@ -89,7 +89,7 @@ pub async fn run<E: From<ClientError> + From<RunError>>(
     client.watch(&id, show).await?;
     let fetched = client.fetch(&id).await?;
     let Fetched { specification: computed, result, .. } = &fetched;
-    let note = other_version::check(specification, computed, (program, &result.program));
+    let note = other_version::check(specification, computed, (program, &result.program()));
     if let Some(note) = note.map_err(RunError::failed)? {
         client.listener().note(&note);
     }

@@ -11,6 +11,7 @@ use std::time::Duration;
 use osteon_common::results::Status as JobEnd;
 use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
+use osteon_files::report::ResultFile;
 use osteon_proto::announced::Received;
 use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::connection::{connect, jobs_client, workers_client};
@@ -72,7 +73,8 @@ async fn left(client: &mut JobsClient<Channel>, job: &str) -> Result<(String, Jo
     loop {
         if let Some(Part::Result(result)) = stream.message().await?.unwrap().part {
             let status = JOB_STATUS.value(result.status).unwrap();
-            return Ok((result.digest, status));
+            let result = ResultFile::from_json(&result.json).unwrap();
+            return Ok((result.digest().to_owned(), status));
         }
     }
 }

@@ -17,10 +17,11 @@ use osteon_coordinator::store::{
     StoredJob,
 };
 use osteon_coordinator::{ComponentFailure, Config, Coordinator, Listener, start};
+use osteon_files::report::ResultFile;
 use osteon_proto::announced::Received;
+use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::connection::{connect, jobs_client, workers_client};
 use osteon_proto::endpoint::Endpoint;
-use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::fetch_response::Part;
@@ -29,7 +30,7 @@ use osteon_proto::v1::{
     AttachRequest, CancelRequest, FetchRequest, GetRequest, JobSnapshot, JobState, JobStatus,
     ListRequest, SubmitRequest, WatchRequest, WorkerHello,
 };
-use osteon_proto::{batch, realizations, results, specification, status};
+use osteon_proto::{batch, realizations, specification, status};
 use osteon_search::Summary;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
@@ -159,10 +160,12 @@ async fn check_leftover(
             }
         }
     }
-    let blocks = ResultBlocks { outcomes, ..ResultBlocks::default() };
-    let result = results::from_message(result.unwrap(), blocks, Vec::new()).unwrap();
-    assert_eq!(result, fake::plain_run(expected));
-    assert_eq!(rows, result.evaluations);
+    let plain = fake::plain_run(expected);
+    let message = result.unwrap();
+    assert_eq!((message.status, &message.reason), (JOB_STATUS.number(plain.status), &plain.reason));
+    assert_eq!(message.json, ResultFile::from_job(expected.kind, &plain).to_json());
+    assert_eq!(rows, plain.evaluations);
+    assert_eq!(outcomes, plain.best.unwrap().outcomes);
 }
 
 #[tokio::test(flavor = "multi_thread")]

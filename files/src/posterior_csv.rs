@@ -3,32 +3,34 @@
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::job::{Data, JobSpecification};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::posterior::{Posterior, PosteriorDraw};
-use osteon_common::results::JobResult;
+use osteon_common::posterior::PosteriorDraw;
 
 use crate::results_csv::{field, number};
 
-/// Returns the text of `posterior.csv`: one row per draw, with the parameters (SI units)
-/// between its number and √(c1111/ρ), the moments of the model's velocities (m/s) and the logarithm
-/// of the density (nats); with groups, the rows of one group after another.
-pub fn posterior(specification: &JobSpecification, result: &JobResult) -> String {
+/// Returns the text of `posterior.csv`, given the draws from the posterior of each set of data: one row per
+/// draw, with the parameters (SI units) between its number and √(c1111/ρ), the moments of the model's
+/// velocities (m/s) and the logarithm of the density (nats); with groups, the rows of one group after
+/// another.
+pub fn posterior<'a>(
+    specification: &JobSpecification,
+    draws: impl IntoIterator<Item = &'a [PosteriorDraw]>,
+) -> String {
     let parameters: Vec<_> = specification.parameters_given().map(Parameter::name).collect();
     let parameters = parameters.join(",");
     let moments = "mean,coefficient_of_variation";
     let mut out = format!("draw,{parameters},bulk_velocity,{moments},log_density");
-    let grouped = specification.data.as_ref().is_some_and(Data::is_grouped);
-    out.push_str(if grouped { ",group\n" } else { "\n" });
-    add(&mut out, result.conclusions.posterior.as_ref(), "");
-    for group in &result.groups {
-        let name = format!(",{}", field(&group.name));
-        add(&mut out, group.conclusions.posterior.as_ref(), &name);
+    let names: Vec<&str> = specification.data.iter().flat_map(Data::names).collect();
+    out.push_str(if names.is_empty() { "\n" } else { ",group\n" });
+    for (set, draws) in draws.into_iter().enumerate() {
+        let end = names.get(set).map(|name| format!(",{}", field(name))).unwrap_or_default();
+        add(&mut out, draws, &end);
     }
     out
 }
 
 /// Appends a row for each draw, each with this end.
-fn add(out: &mut String, posterior: Option<&Posterior>, end: &str) {
-    for (place, draw) in posterior.iter().flat_map(|found| &found.draws).enumerate() {
+fn add(out: &mut String, draws: &[PosteriorDraw], end: &str) {
+    for (place, draw) in draws.iter().enumerate() {
         out.push_str(&place.to_string());
         let PosteriorDraw { point, log_density, mean, coefficient_of_variation } = draw;
         let derived = [speed(point), Some(*mean), Some(*coefficient_of_variation)];

@@ -19,7 +19,7 @@ mod solver;
 use osteon_common::job::JobKind;
 use osteon_common::parameters::Point;
 use osteon_common::results::{JobFailure, JobResult, Status};
-use osteon_common::version::RESULT_SCHEMA;
+use osteon_common::version::{Program, RESULT_SCHEMA};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -76,7 +76,7 @@ impl ResultFile {
 
     /// The text of the file, with a final newline.
     pub fn to_json(&self) -> String {
-        to_pretty_json(match self {
+        document(match self {
             Self::Identification(result) => DocumentContent::Identification(result),
             Self::Propagation(result) => DocumentContent::Propagation(result),
         })
@@ -106,6 +106,14 @@ impl ResultFile {
         }
     }
 
+    /// Moments of the model's velocities at the best point of the job.
+    pub fn velocity(&self) -> &Velocity {
+        match self {
+            Self::Identification(result) => &result.velocity,
+            Self::Propagation(result) => &result.velocity,
+        }
+    }
+
     /// BLAKE3 digest of the evaluations.
     pub fn digest(&self) -> &str {
         match self {
@@ -114,11 +122,44 @@ impl ResultFile {
         }
     }
 
+    /// Number of realizations of each evaluation.
+    pub fn realizations(&self) -> u64 {
+        match self {
+            Self::Identification(result) => result.realizations,
+            Self::Propagation(result) => result.realizations,
+        }
+    }
+
+    /// Seed of the germs.
+    pub fn seed(&self) -> u64 {
+        match self {
+            Self::Identification(result) => result.seed,
+            Self::Propagation(result) => result.seed,
+        }
+    }
+
+    /// The program that computed it.
+    pub fn program(&self) -> Program {
+        let (version, numerics, commit) = match self {
+            Self::Identification(result) => (&result.version, result.numerics, &result.commit),
+            Self::Propagation(result) => (&result.version, result.numerics, &result.commit),
+        };
+        Program { version: version.clone(), numerics, commit: commit.clone() }
+    }
+
     /// Set if a host that computed a part of the result was banned after the job had ended.
     pub fn integrity(&self) -> Option<&IntegrityReport> {
         match self {
             Self::Identification(result) => result.integrity.as_ref(),
             Self::Propagation(result) => result.integrity.as_ref(),
+        }
+    }
+
+    /// Returns the posterior of the job's one set of data, if it asked for it.
+    pub fn posterior(&self) -> Option<&PosteriorReport> {
+        match self {
+            Self::Identification(result) => result.posterior(),
+            Self::Propagation(_) => None,
         }
     }
 
@@ -173,10 +214,13 @@ enum DocumentContent<'a> {
     Simulation(&'a Simulation),
 }
 
+fn document(content: DocumentContent<'_>) -> String {
+    to_pretty_json(&Document { schema: RESULT_SCHEMA, content })
+}
+
 #[expect(clippy::expect_used, reason = "it fails only for map keys that are not strings")]
-fn to_pretty_json(content: DocumentContent<'_>) -> String {
-    let document = Document { schema: RESULT_SCHEMA, content };
-    serde_json::to_string_pretty(&document).expect("keys are strings") + "\n"
+fn to_pretty_json(value: &impl Serialize) -> String {
+    serde_json::to_string_pretty(value).expect("keys are strings") + "\n"
 }
 
 /// The keys that decide how the others are read.

@@ -3,13 +3,12 @@
 
 use std::fmt::{self, Write as _};
 
-use osteon_common::inference::{Conclusions, DerivedQuantity};
 use osteon_common::job::{Data, JobSpecification, Range};
-use osteon_common::moments::ConfidenceInterval;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Parameter;
-use osteon_common::posterior::{Posterior, PosteriorSummary};
-use osteon_common::results::{DataSummary, Evaluation, GroupResult, JobResult, Status};
+use osteon_common::results::{Evaluation, Status};
+
+use crate::report::{Group, Moments, QuantityEstimate, QuantityPosterior};
 
 /// Returns the text of `history.csv`: one row per evaluation of the search, with the
 /// parameters between its number and its moments; with groups or several starts, also the group and
@@ -94,7 +93,7 @@ const COMPARED_MAX: usize = 200;
 /// they are unknown.
 pub fn groups(
     specification: &JobSpecification,
-    result: &JobResult,
+    groups: &[Group],
     history: &[Evaluation],
 ) -> String {
     let free = |name: &Parameter| matches!(specification.range(*name), Range::Free { .. });
@@ -102,26 +101,26 @@ pub fn groups(
     let elastic = Parameter::ALL.into_iter().filter(|name| *name != Parameter::Dispersion);
     let free: Vec<Parameter> = elastic.filter(free).collect();
     let mut out = header(specification, &free);
-    for (set, group) in result.groups.iter().enumerate() {
-        let best = group.best.as_ref();
+    for (set, group) in groups.iter().enumerate() {
+        let best = group.best_point();
         let mut fields = vec![
             field(&group.name),
-            group.data.count.unwrap_or(0).to_string(),
+            group.data.count.flatten().unwrap_or(0).to_string(),
             group.status.name().to_owned(),
-            number(best.and_then(|best| best.cost)),
+            number(group.cost),
         ];
         for quantity in quantities_of(group) {
-            fields.push(number(quantity.map(|quantity| quantity.value)));
+            fields.push(number(quantity.and_then(|quantity| quantity.value)));
             fields.extend(ends(quantity.and_then(|quantity| quantity.interval)));
         }
         let known = specification.data.as_ref().map(|data| data.known(set)).unwrap_or_default();
-        let of_best = |name: Parameter| {
-            number(known.get(name).or_else(|| best.map(|best| best.point.get(name))))
-        };
+        let of_best =
+            |name: Parameter| number(known.get(name).or_else(|| best.map(|point| point.get(name))));
         fields.extend(specification.parameters_given().map(of_best));
         fields.extend(free.iter().flat_map(|&name| identified(name, group)));
         fields.extend(measured(group));
-        fields.push(best.map_or_else(String::new, |best| best.failures.total().to_string()));
+        let failed = group.failures.values().copied().fold(0, u64::saturating_add);
+        fields.push(best.map_or_else(String::new, |_| failed.to_string()));
         let of_group = |row: &&Evaluation| row.role.group as usize == set;
         let searched = history.iter().filter(|row| row.role.is_of_search());
         fields.push(searched.filter(of_group).count().to_string());
@@ -152,36 +151,32 @@ fn header(specification: &JobSpecification, free: &[Parameter]) -> String {
 
 /// Returns a free parameter with the ends of its interval, if the data determine it or there is a
 /// posterior.
-fn identified(name: Parameter, group: &GroupResult) -> [String; 3] {
-    let Conclusions { inference, posterior, .. } = &group.conclusions;
-    let quantity = match posterior {
-        Some(posterior) => of_posterior(posterior, name),
-        None => {
-            let found = inference.iter().flat_map(|found| &found.parameters);
-            let mut found = found.filter(|(known, _)| *known == name);
-            found.next().map(|(_, quantity)| (*quantity).into())
-        }
+fn identified(name: Parameter, group: &Group) -> [String; 3] {
+    let by_point =
+        || group.identified.as_ref()?.parameters.get(&name)?.as_ref().map(GroupQuantity::from);
+    let quantity = match &group.posterior {
+        Some(posterior) => posterior.parameters.get(&name).map(GroupQuantity::from),
+        None => by_point(),
     };
     let quantity = quantity.filter(|quantity| quantity.interval.is_some());
     let [lower, upper] = ends(quantity.and_then(|quantity| quantity.interval));
-    [number(quantity.map(|quantity| quantity.value)), lower, upper]
+    [number(quantity.and_then(|quantity| quantity.value)), lower, upper]
 }
 
 /// Returns the moments of a group's data with their intervals, and the test against the model's
 /// law.
-fn measured(group: &GroupResult) -> [String; 8] {
-    let DataSummary { moments, intervals, .. } = &group.data;
-    let both =
-        |interval: Option<ConfidenceInterval>| ends(interval.map(|found| [found.low, found.high]));
-    let [mean_lower, mean_upper] = both(intervals.map(|found| found.mean));
+fn measured(group: &Group) -> [String; 8] {
+    let Moments { mean, coefficient_of_variation } = group.data.moments;
+    let intervals = group.data.intervals();
+    let [mean_lower, mean_upper] = ends(intervals.map(|found| found.mean));
     let [variation_lower, variation_upper] =
-        both(intervals.map(|found| found.coefficient_of_variation));
-    let test = group.best.as_ref().and_then(|best| best.kolmogorov);
+        ends(intervals.map(|found| found.coefficient_of_variation));
+    let test = group.data.kolmogorov.flatten();
     [
-        number(Some(moments.mean)),
+        number(mean),
         mean_lower,
         mean_upper,
-        number(Some(moments.coefficient_of_variation)),
+        number(coefficient_of_variation),
         variation_lower,
         variation_upper,
         number(test.map(|test| test.distance)),
@@ -191,23 +186,20 @@ fn measured(group: &GroupResult) -> [String; 8] {
 
 /// Returns the reason why a group did not converge, or has no intervals; empty if neither is the
 /// case.
-fn reason(group: &GroupResult) -> &str {
+fn reason(group: &Group) -> &str {
     let told = group.reason.as_deref().and_then(|reason| reason.lines().next());
-    let unknown = match (&group.best, &group.conclusions.inference) {
+    let has_posterior = group.posterior.is_some();
+    let unknown = match (group.best_point(), &group.identified) {
         (None, _) => "no point was feasible",
-        (Some(_), None) if group.conclusions.posterior.is_none() => {
-            "the derivatives are not known: no intervals"
-        }
+        (Some(_), None) if !has_posterior => "the derivatives are not known: no intervals",
         (Some(_), Some(found)) if !found.matched => {
             "the model does not match the data within their noise: no intervals"
         }
         _ if group.status == Status::MaxEvaluations => "the evaluations are used up",
-        (_, Some(_)) if group.data.intervals.is_none() && group.conclusions.posterior.is_none() => {
+        (_, Some(_)) if group.data.intervals().is_none() && !has_posterior => {
             "fewer than five velocities or subjects: no intervals"
         }
-        (_, Some(found))
-            if !found.undetermined.is_empty() && group.conclusions.posterior.is_none() =>
-        {
+        (_, Some(found)) if !found.free_directions.is_empty() && !has_posterior => {
             "the data leave directions free: no intervals without a posterior"
         }
         _ => "",
@@ -226,7 +218,7 @@ fn ends(interval: Option<[f64; 2]>) -> [String; 2] {
 ///
 /// The sampling noise, which all groups share, is counted in both groups: intervals tend to be too
 /// wide.
-pub fn comparison(result: &JobResult) -> String {
+pub fn comparison(groups: &[Group]) -> String {
     let mut out = "first,second".to_owned();
     for name in ["bulk_velocity", "dispersion"] {
         out.push_str(&format!(
@@ -234,7 +226,6 @@ pub fn comparison(result: &JobResult) -> String {
         ));
     }
     out.push('\n');
-    let groups = &result.groups;
     let firsts = if groups.len() > COMPARED_MAX { 1 } else { groups.len() };
     for (first, one) in groups.iter().enumerate().take(firsts) {
         for other in &groups[first + 1..] {
@@ -253,13 +244,13 @@ pub fn comparison(result: &JobResult) -> String {
 /// distances of the ends of both intervals from their values (MOVER: G. Y. Zou and A. Donner, Stat.
 /// Med. 27 (2008)): intervals of few data are far from symmetric.
 fn difference((first, second): (Option<GroupQuantity>, Option<GroupQuantity>)) -> [Option<f64>; 3] {
-    let Some((first, second)) = first.zip(second) else { return [None; 3] };
-    let difference = first.value - second.value;
-    let Some((one, other)) = first.interval.zip(second.interval) else {
-        return [Some(difference), None, None];
-    };
+    let values = first.zip(second).and_then(|(one, other)| one.value.zip(other.value));
+    let Some((first_value, second_value)) = values else { return [None; 3] };
+    let difference = first_value - second_value;
+    let intervals = first.and_then(|one| one.interval).zip(second.and_then(|one| one.interval));
+    let Some((one, other)) = intervals else { return [Some(difference), None, None] };
     let reach = |first_end: f64, second_end: f64| {
-        libm::hypot(first_end - first.value, second_end - second.value)
+        libm::hypot(first_end - first_value, second_end - second_value)
     };
     // The difference is smallest where the first is at its lower end and the second at its upper.
     let (below, above) = (reach(one[0], other[1]), reach(one[1], other[0]));
@@ -270,35 +261,29 @@ fn difference((first, second): (Option<GroupQuantity>, Option<GroupQuantity>)) -
 /// point.
 #[derive(Debug, Clone, Copy)]
 struct GroupQuantity {
-    value: f64,
+    value: Option<f64>,
     interval: Option<[f64; 2]>,
 }
 
-impl From<DerivedQuantity> for GroupQuantity {
-    fn from(found: DerivedQuantity) -> Self {
-        Self { value: found.value, interval: found.known.map(|known| known.interval) }
+impl From<&QuantityEstimate> for GroupQuantity {
+    fn from(found: &QuantityEstimate) -> Self {
+        Self { value: found.value, interval: found.ends() }
     }
 }
 
-impl From<&PosteriorSummary> for GroupQuantity {
-    fn from(found: &PosteriorSummary) -> Self {
-        Self { value: found.mean, interval: Some(found.interval()) }
+impl From<&QuantityPosterior> for GroupQuantity {
+    fn from(found: &QuantityPosterior) -> Self {
+        Self { value: found.mean, interval: found.ends() }
     }
-}
-
-fn of_posterior(posterior: &Posterior, name: Parameter) -> Option<GroupQuantity> {
-    let place = posterior.free.iter().position(|free| *free == name)?;
-    posterior.parameters.get(place).map(GroupQuantity::from)
 }
 
 /// Returns √(c1111/ρ) and the dispersion.
-fn quantities_of(group: &GroupResult) -> [Option<GroupQuantity>; 2] {
-    let Conclusions { inference, posterior, .. } = &group.conclusions;
-    let found = inference.as_ref();
-    let by_point = [found.map(|found| found.bulk_velocity), found.map(|found| found.dispersion)];
+fn quantities_of(group: &Group) -> [Option<GroupQuantity>; 2] {
+    let found = group.identified.as_ref();
+    let by_point = [found.map(|found| &found.bulk_velocity), found.map(|found| &found.dispersion)];
     let by_point = by_point.map(|quantity| quantity.map(GroupQuantity::from));
-    let Some(posterior) = posterior else { return by_point };
-    let dispersion = of_posterior(posterior, Parameter::Dispersion);
+    let Some(posterior) = &group.posterior else { return by_point };
+    let dispersion = posterior.parameters.get(&Parameter::Dispersion).map(GroupQuantity::from);
     [Some((&posterior.bulk_velocity).into()), dispersion.or(by_point[1])]
 }
 
@@ -307,14 +292,15 @@ pub(crate) fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map_or_else(String::new, |value| format!("{value:?}"))
 }
 
-/// Returns the text of `realizations.csv` for groups: the rows of each group at its best point, one
-/// group after another.
-pub fn realizations_of_groups(groups: &[GroupResult]) -> String {
+/// Returns the text of `realizations.csv` for groups, given the name and the outcomes of each: the rows of
+/// each group at its best point, one group after another.
+pub fn realizations_of_groups<'a>(
+    groups: impl IntoIterator<Item = (&'a str, &'a [Outcome])>,
+) -> String {
     let mut out = "index,velocity,failure,group\n".to_owned();
-    for group in groups {
-        let outcomes = group.best.as_ref().map(|best| best.outcomes.as_slice());
-        let name = field(&group.name);
-        for (index, outcome) in outcomes.unwrap_or_default().iter().enumerate() {
+    for (name, outcomes) in groups {
+        let name = field(name);
+        for (index, outcome) in outcomes.iter().enumerate() {
             out.push_str(&realization(index, outcome));
             out.push_str(&format!(",{name}\n"));
         }
@@ -345,20 +331,18 @@ fn realization(index: usize, outcome: &Outcome) -> String {
 mod tests {
     use osteon_common::data_statistics::intervals_of_data;
     use osteon_common::ensemble::Germs;
-    use osteon_common::inference::Uncertainty;
     use osteon_common::special::standard_normal_quantile;
 
     use super::*;
 
     /// Returns the coefficient of variation of velocities of one normal law, with its interval.
-    fn variation(seed: u64, count: usize) -> DerivedQuantity {
+    fn variation(seed: u64, count: usize) -> GroupQuantity {
         let germs = (0..).flat_map(|index| *Germs::draw(seed, index).values());
         let velocity = |u| 3900.0 * (1.0 + 0.03 * standard_normal_quantile(u));
         let data = Data::from_velocities(germs.take(count).map(velocity).collect());
         let interval = intervals_of_data(&data, 0).unwrap().coefficient_of_variation;
-        let interval = [interval.low, interval.high];
-        let known = Some(Uncertainty { standard_error: f64::NAN, interval, free_share: 0.0 });
-        DerivedQuantity { value: data.moments(0).coefficient_of_variation, known }
+        let value = Some(data.moments(0).coefficient_of_variation);
+        GroupQuantity { value, interval: Some([interval.low, interval.high]) }
     }
 
     /// Both groups have the same law, so that the interval of the difference should be above 0 for
@@ -368,7 +352,7 @@ mod tests {
         let [mut above, mut below] = [0; 2];
         for seed in 0..1000 {
             let groups = (variation(2 * seed, 5), variation(2 * seed + 1, 200));
-            let [_, lower, upper] = difference((Some(groups.0.into()), Some(groups.1.into())));
+            let [_, lower, upper] = difference((Some(groups.0), Some(groups.1)));
             above += u32::from(lower.unwrap() > 0.0);
             below += u32::from(upper.unwrap() < 0.0);
         }

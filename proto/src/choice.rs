@@ -3,7 +3,7 @@
 use osteon_common::job::{JobKind, Objective, PriorDistribution, Sampling};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
-use osteon_common::results::{JobFailure, PointMeaning, Status};
+use osteon_common::results::{JobFailure, Status};
 
 use crate::malformed::Malformed;
 use crate::v1;
@@ -152,17 +152,6 @@ pub static JOB_FAILURE: EnumMapping<JobFailure, v1::JobFailureKind> = EnumMappin
         JobFailure::Store => v1::JobFailureKind::Store,
     },
     name: v1::JobFailureKind::as_str_name,
-};
-
-/// Meaning of the best point of a search.
-pub static POINT_MEANING: EnumMapping<PointMeaning, v1::PointMeaning> = EnumMapping {
-    all: &PointMeaning::ALL,
-    message: |meaning| match meaning {
-        PointMeaning::LeastCost => v1::PointMeaning::LeastCost,
-        PointMeaning::SimplexEnd => v1::PointMeaning::SimplexEnd,
-        PointMeaning::NearestToStart => v1::PointMeaning::NearestToStart,
-    },
-    name: v1::PointMeaning::as_str_name,
 };
 
 #[cfg(test)]

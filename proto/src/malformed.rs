@@ -91,6 +91,14 @@ pub enum Malformed {
         /// Number of the evaluation.
         evaluation: u64,
     },
+    /// A text is not the JSON that its field holds.
+    #[error("field `{field}`: {reason}")]
+    Json {
+        /// Name of the field in the `.proto` file.
+        field: &'static str,
+        /// Why it is not.
+        reason: String,
+    },
     /// A stored specification violates a rule.
     #[error("the specification is not valid: {0}")]
     InvalidSpecification(Violations),

@@ -60,29 +60,6 @@ pub fn point_from_message(message: Option<&v1::ParameterValues>) -> Result<Point
     Ok(point)
 }
 
-/// Returns the message of one number for each of these parameters.
-pub(crate) fn some_to_message(parameters: &[Parameter], values: &[f64]) -> v1::ParameterValues {
-    let mut message = v1::ParameterValues::default();
-    for (&parameter, &value) in parameters.iter().zip(values) {
-        *slot(&mut message, parameter) = Some(value);
-    }
-    message
-}
-
-/// Returns the numbers of these parameters.
-///
-/// # Errors
-/// If one is absent.
-pub(crate) fn some_from_message(
-    parameters: &[Parameter],
-    message: &v1::ParameterValues,
-) -> Result<Vec<f64>, Malformed> {
-    let value = |&parameter: &Parameter| {
-        get(message, parameter).ok_or(Malformed::Missing { field: parameter.name() })
-    };
-    parameters.iter().map(value).collect()
-}
-
 fn get(message: &v1::ParameterValues, parameter: Parameter) -> Option<f64> {
     let mut message = *message;
     *slot(&mut message, parameter)

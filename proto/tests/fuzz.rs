@@ -6,33 +6,22 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use osteon_common::inference::Conclusions;
-use osteon_common::job::{JobKind, JobSpecification, Sampling};
-use osteon_common::moments::KolmogorovTest;
-use osteon_common::outcome::{FailureCounts, FailureKind, Outcome, RealizationResult};
-use osteon_common::parameters::{Parameter, Point};
-use osteon_common::results::{
-    BestPoint, DataSummary, DecayEstimate, Estimate, EstimatedError, Evaluation, EvaluationRole,
-    GroupResult, Integrity, JobFailure, JobResult, Moments, PointMeaning, Status as JobEnd,
-};
-use osteon_common::sampling::NominalSampling;
-use osteon_common::version::Program;
+use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
+use osteon_common::parameters::Point;
+use osteon_common::posterior::PosteriorDraw;
 use osteon_files::document::Format;
-use osteon_files::report::ResultFile;
 use osteon_files::{job_file, results_csv};
 use osteon_fuzz::{bounded, damaged, properties, texts};
 use osteon_proto::announced::Received;
 use osteon_proto::batch::{self, Work};
-use osteon_proto::results::ResultBlocks;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::{
-    evaluation, parameter_values, posterior, realizations, results, specification, status, v1,
+    draws, evaluation, history, parameter_values, realizations, specification, status, v1,
 };
 use proptest::prelude::*;
 use prost::Message as _;
 use tonic::{Code, Status};
-
-mod sample_posterior;
 
 /// Longest details of a status, bytes: HTTP/2 peers refuse trailers above 16 KiB, in base64.
 const DETAILS_BYTES_MAX: usize = 12 << 10;
@@ -168,139 +157,16 @@ fn row(number: u64) -> v1::EvaluationRow {
     }
 }
 
-/// A job of two free parameters with two starts.
-fn job_of_two_starts() -> JobSpecification {
-    let text = "[data]\nvelocities = [3900.0, 3950.0, 4000.0, 3909.2, 3990.8]\n[search]\nstarts = 2\n[parameters]\n";
-    let ranges = Parameter::OF_BONE.map(|parameter| {
-        let (name, value) = (parameter.name(), POINT.get(parameter));
-        match parameter {
-            Parameter::Density => {
-                format!("{name} = {{ start = 1600.0, bounds = [1500.0, 2000.0] }}")
-            }
-            Parameter::Dispersion => format!("{name} = {{ start = 0.1, bounds = [0.02, 0.3] }}"),
-            _ => format!("{name} = {{ fixed = {value:?} }}"),
-        }
-    });
-    let text = text.to_owned() + &ranges.join("\n");
-    job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification).unwrap()
+fn draw() -> PosteriorDraw {
+    PosteriorDraw { point: POINT, log_density: -1.5, mean: 3900.0, coefficient_of_variation: 0.03 }
 }
 
-fn moments(mean: f64, coefficient_of_variation: f64) -> Moments {
-    Moments { mean, coefficient_of_variation }
-}
-
-/// An evaluation of each start, then one for each derivative.
-fn history_of_two_starts() -> Vec<Evaluation> {
-    let evaluation = |number: u64, start: u32, varied: Option<Parameter>| {
-        let mut point = POINT;
-        if let Some(parameter) = varied {
-            point.0[parameter as usize] *= 1.0 + 1e-5;
-        }
-        Evaluation {
-            number,
-            role: EvaluationRole { start, varied, ..EvaluationRole::default() },
-            point,
-            moments: Some(moments(3950.0 - number as f64, 0.0103 + 1e-6 * number as f64)),
-            decay: Some(4.6),
-            cost: Some(1e-11),
-            failures: FailureCounts::default(),
-            estimated_error: Some(EstimatedError { median: 1e-5, largest: 3e-5 }),
-        }
-    };
-    vec![
-        evaluation(0, 0, None),
-        evaluation(1, 1, None),
-        evaluation(2, 0, Some(Parameter::Density)),
-        evaluation(3, 0, Some(Parameter::Dispersion)),
-    ]
-}
-
-/// An identification of two free parameters from two starts, with all that there can be.
-fn identification() -> (JobSpecification, Vec<Evaluation>, JobResult) {
-    let (job, history) = (job_of_two_starts(), history_of_two_starts());
-    let best = BestPoint {
-        point: POINT,
-        meaning: Some(PointMeaning::SimplexEnd),
-        cost: Some(1e-11),
-        cost_error: Some(1e-3),
-        penalty: Some(0.0),
-        below_noise_from: Some(0),
-        velocity: Some(Estimate {
-            moments: moments(3950.0, 0.0103),
-            standard_error: moments(2.0, 1e-4),
-            controlled: true,
-        }),
-        decay: Some(DecayEstimate { mean: 4.6, standard_deviation: 0.4, standard_error: 0.01 }),
-        failure_bias: Some(moments(-1.0, 1e-3)),
-        kolmogorov: Some(KolmogorovTest { distance: 0.1, p_value: 0.3 }),
-        failures: FailureCounts::from_outcomes(&outcomes()),
-        estimated_error: Some(EstimatedError { median: 1e-5, largest: 3e-5 }),
-        outcomes: outcomes(),
-    };
-    let posterior = Some(sample_posterior::posterior(POINT));
-    let conclusions = Conclusions::new(&job, 0, Some(&best), &history);
-    let result = JobResult {
-        status: JobEnd::Failed,
-        failure: Some(JobFailure::Store),
-        reason: Some("why".to_owned()),
-        digest: "00".repeat(32),
-        data: job.data.as_ref().map(|data| DataSummary::from_data(data, 0)),
-        conclusions: Conclusions { posterior, ..conclusions },
-        best: Some(best),
-        groups: Vec::new(),
-        objective: job.objective,
-        search: job.search,
-        evaluations: 2,
-        realizations: 4,
-        seed: 1,
-        sampling: Sampling::Sobol,
-        scrambles: 2,
-        control_variate: true,
-        solver: job.setup.solver,
-        nominal: NominalSampling::from_setup(&job.setup),
-        picking: job.setup.picking,
-        program: Program::current(Some("c0ffee")),
-        integrity: Some(Integrity {
-            banned_hosts: vec!["node-7".to_owned()],
-            earlier_digest: Some("00".to_owned()),
-        }),
-    };
-    let Conclusions { inference, profiles, solutions, posterior } = &result.conclusions;
-    assert!(inference.as_ref().is_some_and(|found| found.bulk_velocity.known.is_some()));
-    assert_eq!(profiles.len(), 2);
-    assert!(solutions.as_ref().is_some_and(|found| found.spread.is_some()));
-    assert!(posterior.is_some());
-    (job, history, result)
-}
-
-/// The blocks that belong to [`result`] and [`group`].
-fn blocks() -> ResultBlocks {
-    let JobResult { best, conclusions, .. } = identification().2;
-    ResultBlocks::new(best, conclusions)
-}
-
-fn result() -> v1::JobResult {
-    results::to_message(&identification().2)
-}
-
-fn group() -> v1::GroupResult {
-    let JobResult { best, data, conclusions, .. } = identification().2;
-    let (name, status) = ("left".to_owned(), JobEnd::MaxEvaluations);
-    let data = data.unwrap();
-    results::group_to_message(
-        7,
-        &GroupResult { name, status, reason: None, best, data, conclusions },
-    )
-}
-
-/// Parts of a fetch: a result, its history, a group and realizations.
+/// Parts of a fetch whose contents this crate converts: history, realizations and draws.
 fn fetches() -> Vec<Vec<u8>> {
     let parts = [
-        Part::Result(result()),
         Part::History(v1::HistoryBlock { rows: (0..3).map(row).collect(), groups: Vec::new() }),
-        Part::Group(group()),
         Part::Realizations(realizations::to_message(Some(7), 0, &outcomes())),
-        Part::Draws(posterior::draws_to_message(Some(7), 0, &blocks().draws)),
+        Part::Draws(draws::draws_to_message(Some(7), 0, &[draw()])),
     ];
     parts.map(|part| v1::FetchResponse { part: Some(part) }.encode_to_vec()).to_vec()
 }
@@ -311,55 +177,28 @@ fn check_fetch(bytes: &[u8]) {
     let Ok(v1::FetchResponse { part: Some(part) }) = bounded(bytes.len(), decode) else { return };
     bounded(bytes.len(), || match part {
         Part::Specification(message) => check_specification(&message.encode_to_vec()),
-        Part::Result(message) => check_result(&message),
         Part::History(block) => check_history(&block),
-        Part::Group(message) => check_group(&message),
+        // Clients read the texts in these as files.
+        Part::Result(_) | Part::Group(_) => {}
         Part::Realizations(block) => {
             let Ok((first, outcomes)) = realizations::from_message(&block) else { return };
             assert_eq!(realizations::to_message(block.group, first, &outcomes), block);
         }
         Part::Draws(block) => {
-            let Ok((first, draws)) = posterior::draws_from_message(&block) else { return };
-            let written = posterior::draws_to_message(block.group, first, &draws);
+            let Ok((first, draws)) = draws::draws_from_message(&block) else { return };
+            let written = draws::draws_to_message(block.group, first, &draws);
             assert_eq!(written.encode_to_vec(), block.encode_to_vec());
         }
     });
 }
 
-fn check_result(message: &v1::JobResult) {
-    let Ok(result) = results::from_message(message, blocks(), Vec::new()) else { return };
-    let written = results::to_message(&result);
-    let again = results::from_message(&written, blocks(), Vec::new()).unwrap();
-    // In bytes, for numbers that are none.
-    assert_eq!(results::to_message(&again).encode_to_vec(), written.encode_to_vec());
-    for kind in [JobKind::Identification, JobKind::Propagation] {
-        let text = ResultFile::from_job(kind, &result).to_json();
-        serde_json::from_str::<serde_json::Value>(&text).unwrap();
-    }
-}
-
-fn check_group(message: &v1::GroupResult) {
-    let Ok(found) = results::group_from_message(message, blocks()) else { return };
-    let written = results::group_to_message(message.group, &found);
-    let again = results::group_from_message(&written, blocks()).unwrap();
-    let again = results::group_to_message(message.group, &again);
-    assert_eq!(again.encode_to_vec(), written.encode_to_vec());
-    let result = JobResult { groups: vec![found], data: None, ..identification().2 };
-    let text = ResultFile::from_job(JobKind::Identification, &result).to_json();
-    serde_json::from_str::<serde_json::Value>(&text).unwrap();
-    // A row after the header; a name may have line breaks of its own.
-    let (job, history, _) = identification();
-    assert!(results_csv::groups(&job, &result, &history).lines().count() > 1);
-    assert_eq!(results_csv::comparison(&result).lines().count(), 1);
-}
-
 fn check_history(block: &v1::HistoryBlock) {
-    let rows = block.rows.iter().map(results::evaluation_from_message);
+    let rows = block.rows.iter().map(history::evaluation_from_message);
     let Ok(rows) = rows.collect::<Result<Vec<_>, _>>() else { return };
     for row in &rows {
-        let written = results::evaluation_to_message(row);
-        let again = results::evaluation_from_message(&written).unwrap();
-        let again = results::evaluation_to_message(&again);
+        let written = history::evaluation_to_message(row);
+        let again = history::evaluation_from_message(&written).unwrap();
+        let again = history::evaluation_to_message(&again);
         assert_eq!(again.encode_to_vec(), written.encode_to_vec());
     }
     let searched = rows.iter().filter(|row| row.role.varied.is_none()).count();
@@ -389,9 +228,7 @@ fn every_seed_is_taken() {
         batch::answer_from_message(&message).unwrap();
         check_answer(&bytes);
     }
-    results::from_message(&result(), blocks(), Vec::new()).unwrap();
-    results::group_from_message(&group(), blocks()).unwrap();
-    results::evaluation_from_message(&row(0)).unwrap();
+    history::evaluation_from_message(&row(0)).unwrap();
     fetches().iter().for_each(|bytes| check_fetch(bytes));
 }
 

@@ -21,7 +21,7 @@ def fetched(stub: jobs_pb2_grpc.JobsStub, job: str) -> Any:
     """The result of a job."""
     for response in stub.Fetch(jobs_pb2.FetchRequest(job=job), timeout=LONGEST_S):
         if response.WhichOneof("part") == "result":
-            return response.result
+            return json.loads(response.result.json)
     raise AssertionError("no result")
 
 
@@ -53,7 +53,7 @@ class Plain(TestCase):
             "command line": json.loads(program("identify", file, "--json"))["digest"],
             "embedded": job.identify(progress=False).digest,
             "coordinator": job.identify(coordinator=self.service.url, progress=False).digest,
-            "gRPC": run(stub, job, "one digest").digest,
+            "gRPC": run(stub, job, "one digest")["digest"],
         }
         self.assertEqual(len(set(digests.values())), 1, digests)
 

@@ -160,7 +160,7 @@ pub(super) async fn fetch(
         None => true,
     };
     if wanted {
-        directory.write_results(specification.kind, &fetched, &*user::listener())?;
+        directory.write_results(&fetched, &*user::listener())?;
     }
     let line = format!("{}\n", visible::path(out));
     output::stdout(OutputFormat::Text).verbatim(&line).map_err(stdout_failure)?;
@@ -171,7 +171,7 @@ pub(super) async fn fetch(
 /// same, and a completed run is never replaced.
 fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, CommandFailure> {
     let specification = &fetched.specification;
-    let new = ResultFile::from_job(specification.kind, &fetched.result);
+    let new = &fetched.result;
     // The digest covers everything that was computed; the program's version may differ.
     if (stored.status(), stored.digest()) == (new.status(), new.digest()) {
         return Ok(new.integrity() != stored.integrity());
@@ -182,7 +182,7 @@ fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, 
         return Ok(true);
     }
     let failed = !result_status::is_complete(specification, stored);
-    if failed && !result_status::is_cancelled(&new) || result_status::is_cancelled(stored) {
+    if failed && !result_status::is_cancelled(new) || result_status::is_cancelled(stored) {
         return Ok(true);
     }
     let shown = |result: &ResultFile| {
@@ -193,7 +193,7 @@ fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, 
         "{} holds another result of this job ({} there, {} fetched); choose another --out directory",
         out.display(),
         shown(stored),
-        shown(&new)
+        shown(new)
     )))
 }
 

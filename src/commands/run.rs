@@ -9,7 +9,7 @@ use osteon_client::embedded::{EmbeddedSetup, StoreLocation};
 use osteon_client::result_status;
 use osteon_client::results_directory::ResultsDirectory;
 use osteon_client::run::{self, JobRun};
-use osteon_common::job::{JobKind, JobSpecification};
+use osteon_common::job::JobSpecification;
 use osteon_common::results::Status;
 use osteon_coordinator::service::open_files;
 use osteon_files::job_file;
@@ -70,7 +70,7 @@ pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, Comman
     let job =
         JobRun { specification, name: &run.name, directory: directory.as_ref(), program: &program };
     let fetched = run_at(location, run.page, job, shown, interruption).await?;
-    let result = keep(run.kind, &fetched, directory.as_ref())?;
+    let result = keep(fetched, directory.as_ref())?;
     show(&run, specification, &result)
 }
 
@@ -119,13 +119,12 @@ fn failed_before(
 
 /// Writes the results of an ended job, if there is a directory for them, and returns the result.
 fn keep(
-    kind: JobKind,
-    fetched: &Fetched,
+    fetched: Fetched,
     directory: Option<&ResultsDirectory>,
 ) -> Result<ResultFile, CommandFailure> {
-    let missing = result_status::missing_result(fetched);
+    let missing = result_status::missing_result(&fetched);
     if let Some(directory) = directory
-        && (missing.is_some() || fetched.result.status == Status::Cancelled)
+        && (missing.is_some() || fetched.status == Status::Cancelled)
     {
         // The same command must run the job again, not show the same ending.
         directory.forget_request();
@@ -133,10 +132,10 @@ fn keep(
     if let Some(missing) = missing {
         return Err(CommandFailure::failed(anyhow!(missing)));
     }
-    match directory {
-        Some(directory) => Ok(directory.write_results(kind, fetched, &*user::listener())?),
-        None => Ok(ResultFile::from_job(kind, &fetched.result)),
+    if let Some(directory) = directory {
+        directory.write_results(&fetched, &*user::listener())?;
     }
+    Ok(fetched.result)
 }
 
 fn show(

@@ -11,6 +11,7 @@ use osteon_client::request_id::RequestId;
 use osteon_common::job::JobSpecification;
 use osteon_common::moments::Estimate;
 use osteon_common::outcome::{FailureCounts, Outcome};
+use osteon_files::report::ResultFile;
 use osteon_proto::v1::JobSnapshot;
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -148,23 +149,30 @@ fn refused(error: ClientError) -> ProtocolError {
 
 /// Returns what a job has computed.
 fn result_of(job: &JobSpecification, fetched: Fetched) -> Result<PointResult, ProtocolError> {
-    let Fetched { specification: computed, result, .. } = fetched;
-    other_version::check(job, &computed, (&program::current(), &result.program))
+    let Fetched { specification: computed, reason, result, samples, .. } = fetched;
+    other_version::check(job, &computed, (&program::current(), &result.program()))
         .map_err(|error| ProtocolError::output(error.to_string()))?;
-    let Some(best) = result.best else {
-        let reason = result.reason.unwrap_or_else(|| "the job was cancelled".to_owned());
-        return Err(ProtocolError::output(format!("the point was not evaluated: {reason}")));
+    let ResultFile::Propagation(found) = result else {
+        return Err(ProtocolError::output(
+            "the coordinator sent the result of another kind of job",
+        ));
     };
+    if found.parameters.point(found.dispersion).is_none() {
+        let reason = reason.unwrap_or_else(|| "the job was cancelled".to_owned());
+        return Err(ProtocolError::output(format!("the point was not evaluated: {reason}")));
+    }
+    let mut failures = FailureCounts::default();
+    found.failures.iter().for_each(|(kind, count)| failures.add(*kind, *count));
     let most = job.monte_carlo.max_failed_fraction;
-    let (failed, count) = (best.failures.total(), job.monte_carlo.realizations);
-    match best.velocity {
+    let (failed, count) = (failures.total(), job.monte_carlo.realizations);
+    match found.velocity.estimate() {
         Some(velocity) if failed as f64 / count as f64 <= most => {
-            let (failures, outcomes) = (best.failures, best.outcomes);
-            Ok(PointResult { velocity, digest: result.digest, failures, outcomes })
+            let outcomes = samples.into_iter().next().unwrap_or_default().outcomes;
+            Ok(PointResult { velocity, digest: found.digest, failures, outcomes })
         }
         _ => Err(ProtocolError::infeasible(format!(
             "{failed} of {count} realizations failed ({}); max_failed_fraction is {most:?}",
-            counted(&best.failures)
+            counted(&failures)
         ))),
     }
 }

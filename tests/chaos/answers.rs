@@ -6,10 +6,9 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use osteon_common::job::JobKind;
+use osteon_common::results::JobFailure;
 use osteon_common::version;
-use osteon_proto::v1::{
-    BannedWorker, JobFailureKind, JobState, JobStatus, ListBansRequest, WorkerHello,
-};
+use osteon_proto::v1::{BannedWorker, JobState, JobStatus, ListBansRequest, WorkerHello};
 use tonic::{Code, Status};
 
 use crate::api::{Api, specification};
@@ -43,7 +42,7 @@ impl Story {
     }
 
     fn check_end(&mut self) {
-        assert_eq!(self.api.end(&self.job).digest, self.digest);
+        assert_eq!(self.api.end(&self.job).digest(), self.digest);
     }
 
     fn banned(&mut self) -> Vec<BannedWorker> {
@@ -248,13 +247,13 @@ fn a_realization_that_kills_its_workers_fails_its_job_and_no_other() {
         on_thread(move || mortals(url, process, (7, 33)))
     });
     let failed = api.end(&doomed);
-    assert_eq!(failed.status(), JobStatus::Failed);
-    assert_eq!(failed.failure(), JobFailureKind::PoisonRealization);
+    let (failure, reason) = failed.failure().unwrap();
+    assert_eq!(failure, JobFailure::PoisonRealization);
+    let reason = reason.unwrap_or_default();
     for part in ["realization 33", "osteon simulate", "mandel = ["] {
-        let reason = failed.reason.as_deref().unwrap_or_default();
         assert!(reason.contains(part), "{part} in {reason}");
     }
-    assert_eq!(api.end(&other).digest, undisturbed("identify", &sound));
+    assert_eq!(api.end(&other).digest(), undisturbed("identify", &sound));
     service.kill();
     for worker in workers {
         end(worker);

@@ -6,7 +6,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use osteon_common::job::JobKind;
-use osteon_proto::v1::{JobFailureKind, JobResult, JobStatus, ListBansRequest};
+use osteon_common::results::JobFailure;
+use osteon_files::report::ResultFile;
+use osteon_proto::v1::ListBansRequest;
 
 use crate::altering::{AlteringProxy, Fault};
 use crate::api::{Api, specification};
@@ -46,7 +48,7 @@ impl Story {
     }
 
     /// Runs a job; returns its result.
-    fn run(&mut self, job: &Path) -> JobResult {
+    fn run(&mut self, job: &Path) -> ResultFile {
         let id = self.api.submit(&specification(job, JobKind::Identification), "").unwrap();
         self.api.end(&id)
     }
@@ -70,8 +72,8 @@ fn a_broken_machine_of_two_processes_is_banned_and_in_no_result() {
         for seed in 1..=4 {
             let job = job_with_seed(&story.scratch, &job(400, 6), seed);
             let found = story.run(&job);
-            assert_ne!(found.status(), JobStatus::Failed);
-            assert_eq!(found.digest, undisturbed("identify", &job), "seed {seed}");
+            assert_eq!(found.failure(), None);
+            assert_eq!(found.digest(), undisturbed("identify", &job), "seed {seed}");
         }
         assert_eq!(story.banned(), ["broken"]);
         for broken in &mut story.broken {
@@ -103,8 +105,9 @@ fn of_two_machines_none_is_believed_and_none_is_banned() {
     for seed in 1..=2 {
         let job = job_with_seed(&story.scratch, &job(400, 6), seed);
         let ended = story.run(&job);
-        assert_eq!(ended.failure(), JobFailureKind::IntegrityError, "{:?}", ended.reason);
-        let reason = ended.reason.unwrap_or_default();
+        let (failure, reason) = ended.failure().unwrap();
+        let reason = reason.unwrap_or_default();
+        assert_eq!(failure, JobFailure::IntegrityError, "{reason}");
         assert!(reason.contains("broken") && reason.contains("machine-"), "{reason}");
     }
     assert!(story.banned().is_empty());
@@ -182,17 +185,12 @@ fn machines_that_are_restarted_and_wrong_in_part_are_in_no_result() {
             let _end = Ended(&is_over);
             for (expected, job) in &jobs {
                 let found = story.run(job);
-                if found.status() == JobStatus::Failed {
+                if let Some((failure, reason)) = found.failure() {
                     // One host against one: nobody knows which is right.
-                    assert_eq!(
-                        found.failure(),
-                        JobFailureKind::IntegrityError,
-                        "{:?}",
-                        found.reason
-                    );
-                    assert!(sound <= 1, "{:?}", found.reason);
+                    assert_eq!(failure, JobFailure::IntegrityError, "{reason:?}");
+                    assert!(sound <= 1, "{reason:?}");
                 } else {
-                    assert_eq!(&found.digest, expected, "{}", job.display());
+                    assert_eq!(found.digest(), expected, "{}", job.display());
                 }
             }
         });

@@ -88,7 +88,7 @@ fn two_hundred_submit_at_once_and_anothers_job_keeps_its_share() {
     let cancel = CancelRequest { job: other };
     api.call(async |client| client.cancel(cancel).await).unwrap();
     for job in crowd {
-        assert_eq!(api.end(&job).digest, digest);
+        assert_eq!(api.end(&job).digest(), digest);
     }
 }
 
@@ -117,7 +117,7 @@ impl Story {
     /// Checks that the job ends with its digest, and that no worker was lost.
     fn check_end(&mut self) {
         let digest = undisturbed("identify", &self.file);
-        assert_eq!(self.api.end(&self.job).digest, digest);
+        assert_eq!(self.api.end(&self.job).digest(), digest);
         let log = std::fs::read_to_string(self.scratch.path("workers.log")).unwrap();
         assert_eq!(log.matches(" attached").count(), 2, "{log}");
     }

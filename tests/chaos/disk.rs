@@ -115,7 +115,7 @@ fn on_a_full_disk_jobs_wait_and_go_on_when_there_is_room() {
     assert!(api.job(&id).evaluations >= seen.evaluations);
     assert_eq!(api.submit(&specification, "first").unwrap(), id);
     assert_eq!(api.jobs().unwrap().len(), 1, "the refused job is there");
-    assert_eq!(api.end(&id).digest, digest);
+    assert_eq!(api.end(&id).digest(), digest);
 }
 
 /// With a limit on file sizes, SQLite gets an error in the middle of a write, as with a quota.
@@ -137,7 +137,7 @@ fn where_the_quota_ends_jobs_wait_and_go_on_when_it_is_raised() {
     let process = service.process().id().to_string();
     let raised = Command::new("prlimit").args(["--pid", &process, "--fsize=unlimited:"]).status();
     assert!(raised.unwrap().success());
-    assert_eq!(api.end(&id).digest, digest);
+    assert_eq!(api.end(&id).digest(), digest);
 }
 
 /// Checks the messages of a coordinator that does not start on `directory`, and that nothing there
@@ -266,7 +266,7 @@ fn lost_jobs_that_are_accepted_are_not_asked_about_again() {
     let mut service = Service::start(&scratch, &[]);
     let _worker = service.worker(&scratch);
     let mut api = Api::new(service.url());
-    assert_eq!(api.end("4").digest, undisturbed("identify", &file));
+    assert_eq!(api.end("4").digest(), undisturbed("identify", &file));
     service.end();
 }
 
@@ -288,7 +288,7 @@ fn a_second_coordinator_is_refused_and_the_first_goes_on() {
     let _worker = service.worker(&scratch);
     let mut api = Api::new(service.url());
     let id = api.submit(&specification(&file, JobKind::Identification), "").unwrap();
-    assert_eq!(api.end(&id).digest, undisturbed("identify", &file));
+    assert_eq!(api.end(&id).digest(), undisturbed("identify", &file));
     let address = fs::read_to_string(directory.join("address")).unwrap();
     assert_eq!(address.trim_end(), service.url());
 }

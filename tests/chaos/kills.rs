@@ -250,8 +250,8 @@ impl<'a> Storm<'a> {
             let again = self.api.submit(&self.kinds[*kind].specification, &id).unwrap();
             assert!(acknowledged.as_ref().is_none_or(|job| *job == again), "{id} is two jobs");
             let result = self.api.end(&again);
-            assert_eq!(result.digest, self.kinds[*kind].digest, "{id}, job {again}");
-            self.survived.evaluations += result.evaluations;
+            assert_eq!(result.digest(), self.kinds[*kind].digest, "{id}, job {again}");
+            self.survived.evaluations += self.api.job(&again).evaluations;
         }
         let jobs = self.api.jobs().unwrap();
         assert_eq!(jobs.len(), self.requests.len(), "a submission was accepted twice");

@@ -95,7 +95,7 @@ fn half_closed_connections_are_given_up_and_made_anew() {
         network.proxies[fault % 2].half_close(way);
         eventually("the worker attaches again", || network.attachments() > before);
     }
-    assert_eq!(network.api.end(&job).digest, network.digest);
+    assert_eq!(network.api.end(&job).digest(), network.digest);
 }
 
 #[test]
@@ -117,5 +117,5 @@ fn connections_that_are_silent_one_way_are_given_up_and_made_anew() {
     });
     assert!(expired, "the coordinator ended no lease of a silent worker");
     stall(1, Way::Down);
-    assert_eq!(network.api.end(&job).digest, network.digest);
+    assert_eq!(network.api.end(&job).digest(), network.digest);
 }

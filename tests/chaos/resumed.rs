@@ -70,7 +70,7 @@ fn a_resumed_job_repeats_no_more_than_the_evaluation_in_flight() {
         // Batches of the previous run do not count.
         while batches.try_recv().is_ok() {}
     }
-    assert_eq!(api.end(&id).digest, digest);
+    assert_eq!(api.end(&id).digest(), digest);
     runtime.shutdown_background();
 
     let points: Vec<Option<ParameterValues>> =

@@ -43,7 +43,7 @@ impl Story {
     }
 
     fn check_end(&mut self) {
-        assert_eq!(self.api.end(&self.job).digest, self.digest);
+        assert_eq!(self.api.end(&self.job).digest(), self.digest);
         self.api.until("both workers are there", &self.job, |seen| seen.workers == 2);
     }
 }

@@ -1,6 +1,7 @@
 """A client of osteon in Python, made from its .proto files. docs/grpc.md explains it."""
 
 import array
+import json
 import time
 
 import grpc
@@ -97,37 +98,24 @@ def watch(jobs, job, show, patience=10.0):
 
 
 def fetch(jobs, job):
-    """The result of an ended job, those of its groups in their order, and the velocities at the best
-    points, m/s, NaN on failure: by the number of the group, None where there are no groups."""
+    """The result of an ended job, as in `result.json`, and the velocities at the best points, m/s, NaN
+    on failure: by the number of the group, None where there are no groups."""
     result, groups, velocities = None, [], {}
     for response in jobs.Fetch(jobs_pb2.FetchRequest(job=job)):
         part = response.WhichOneof("part")
         if part == "result":
-            result = response.result
+            result = json.loads(response.result.json)
         elif part == "group":
-            groups.append(response.group)
+            groups.append(json.loads(response.group.json))
         elif part == "realizations":
             block = response.realizations
             group = block.group if block.HasField("group") else None
             of_point = velocities.setdefault(group, array.array("d"))
             for code, velocity in zip(block.codes, block.velocities):
                 of_point.append(velocity if code == 0 else float("nan"))
-    return result, groups, velocities
-
-
-def known(found):
-    """What the data of a result or of a group fix, by name: value, and both ends of its interval."""
-    quantities = {
-        "bulk_velocity": found.identified.bulk_velocity,
-        "dispersion": found.identified.dispersion,
-    }
-    for one in found.identified.parameters:
-        quantities[specification_pb2.Parameter.Name(one.parameter)] = one.quantity
-    return {
-        name: (quantity.value, quantity.interval.lower, quantity.interval.upper)
-        for name, quantity in quantities.items()
-        if quantity.HasField("interval")
-    }
+    if groups:
+        result["groups"] = groups
+    return result, velocities
 
 
 def every_job(jobs, page_size=100):

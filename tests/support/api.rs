@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use osteon_common::job::JobKind;
 use osteon_files::job_file;
+use osteon_files::report::ResultFile;
 use osteon_proto::connection::{connect, jobs_client};
 use osteon_proto::specification;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{
-    FetchRequest, GetRequest, JobResult, JobSnapshot, JobSpecification, JobState, ListRequest,
+    FetchRequest, GetRequest, JobSnapshot, JobSpecification, JobState, ListRequest,
     ListWorkersRequest, SubmitRequest,
 };
 use tokio::runtime::Runtime;
@@ -109,18 +110,19 @@ impl Api {
     }
 
     /// Waits for the end of a job; returns its result.
-    pub(crate) fn end(&mut self, job: &str) -> JobResult {
+    pub(crate) fn end(&mut self, job: &str) -> ResultFile {
         self.until("the job ends", job, |seen| seen.state() == JobState::Ended);
         self.result(job)
     }
 
     /// Returns the result of an ended job.
-    pub(crate) fn result(&mut self, job: &str) -> JobResult {
-        let result = |part| match part {
-            Part::Result(result) => Some(result),
+    pub(crate) fn result(&mut self, job: &str) -> ResultFile {
+        let json = |part| match part {
+            Part::Result(result) => Some(result.json),
             _ => None,
         };
-        self.parts(job).into_iter().find_map(result).unwrap()
+        let json = self.parts(job).into_iter().find_map(json).unwrap();
+        ResultFile::from_json(&json).unwrap()
     }
 
     /// Returns all parts of an ended job's results.

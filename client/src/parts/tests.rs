@@ -1,51 +1,50 @@
-use osteon_common::job::{Data, Group};
-use osteon_common::results::{DataSummary, GroupResult, Status};
+use serde_json::json;
 
 use super::*;
 use crate::results_directory::tests::fetched;
-use crate::sample_result::drawn_posterior;
+use crate::sample_result::{drawn_posterior, identification, posterior, propagation};
+use osteon_common::results::Status;
 
-/// The output of a job with a posterior: of the job itself, or of two groups.
+/// The output of a job with a posterior: of the job itself, or of its groups.
 fn output(grouped: bool) -> Fetched {
-    let mut output = fetched(Status::Converged);
-    output.specification = output.specification.clone();
-    let posterior = Some(drawn_posterior());
+    let samples = SetSamples { outcomes: Vec::new(), draws: drawn_posterior().draws };
     if !grouped {
-        output.result.conclusions.posterior = posterior;
-        return output;
+        let partial = json!({ "dispersion": null, "posterior": posterior() });
+        let result = identification(&partial.to_string());
+        return Fetched { result, samples: vec![samples], ..fetched(Status::Converged) };
     }
-    let groups = ["left", "right"].map(|name| (name.to_owned(), vec![3900.0, 3950.0]));
-    let data = groups.map(|(name, velocities)| Group::new(name, velocities)).to_vec();
-    let data = Data::from_groups(data);
-    let group = |(set, name): (usize, &str)| {
-        let mut conclusions = output.result.conclusions.clone();
-        conclusions.posterior.clone_from(&posterior);
-        let data = DataSummary::from_data(&data, set);
-        let (status, reason, best) = (Status::Converged, None, None);
-        GroupResult { name: name.to_owned(), status, reason, best, data, conclusions }
-    };
-    output.result.groups = data.names().enumerate().map(group).collect();
-    output.specification.data = Some(data);
-    output
+    let text = include_str!("../../../fuzz/corpus/results/groups.json");
+    let mut result = ResultFile::from_json(text).unwrap();
+    let ResultFile::Identification(found) = &mut result else { unreachable!() };
+    for group in found.groups.as_mut().unwrap() {
+        (group.dispersion, group.posterior) = (None, Some(posterior()));
+    }
+    let samples = vec![samples; result.groups().len()];
+    Fetched { result, samples, ..fetched(Status::Converged) }
 }
 
 fn draws(group: Option<u32>, first: u64) -> Part {
     let draws = drawn_posterior().draws;
     let first_of = usize::try_from(first).unwrap();
-    Part::Draws(posterior::draws_to_message(group, first, &draws[first_of..=first_of]))
+    Part::Draws(draws::draws_to_message(group, first, &draws[first_of..=first_of]))
 }
 
 /// The parts of a fetch, each draw in a block of its own.
 fn parts(output: &Fetched) -> Vec<Part> {
+    let mut of_job = output.result.clone();
+    let ResultFile::Identification(found) = &mut of_job else { unreachable!() };
+    let groups = found.groups.take().unwrap_or_default();
+    found.groups = (!groups.is_empty()).then(Vec::new);
+    let (status, reason) = (JOB_STATUS.number(output.status), output.reason.clone());
     let mut parts = vec![
         Part::Specification(specification::to_message(&output.specification)),
-        Part::Result(results::to_message(&output.result)),
+        Part::Result(v1::JobResult { status, reason, json: of_job.to_json() }),
     ];
-    if output.result.groups.is_empty() {
+    if groups.is_empty() {
         parts.extend([draws(None, 0), draws(None, 1)]);
     }
-    for (number, group) in (0..).zip(&output.result.groups) {
-        parts.push(Part::Group(results::group_to_message(number, group)));
+    for (number, group) in (0..).zip(groups) {
+        parts.push(Part::Group(v1::GroupResult { group: number, json: group.to_json() }));
         parts.extend([draws(Some(number), 0), draws(Some(number), 1)]);
     }
     parts
@@ -62,8 +61,7 @@ fn draws_come_back_to_their_posterior() {
     for grouped in [false, true] {
         let output = output(grouped);
         let again = assembled(parts(&output)).unwrap();
-        assert_eq!(again.result, output.result);
-        assert_eq!(again.specification, output.specification);
+        assert_eq!(again, output);
     }
 }
 
@@ -88,8 +86,30 @@ fn draws_out_of_place_are_refused() {
     // A result without a posterior has no draws.
     let without = |parts: &mut Vec<Part>| {
         if let Part::Result(result) = &mut parts[1] {
-            result.posterior = None;
+            result.json = fetched(Status::Converged).result.to_json();
         }
     };
-    assert_eq!(refused(false, without), "posterior");
+    assert_eq!(refused(false, without), "draws");
+}
+
+#[test]
+fn a_result_that_is_none_is_refused() {
+    let refused = |grouped: bool, json: &str| {
+        let mut parts = parts(&output(grouped));
+        for part in &mut parts {
+            match part {
+                Part::Result(result) if !grouped => result.json = json.to_owned(),
+                Part::Group(group) => group.json = json.to_owned(),
+                _ => {}
+            }
+        }
+        assembled(parts).unwrap_err().to_string()
+    };
+    for grouped in [false, true] {
+        assert!(refused(grouped, "").starts_with("field `json`: "), "{}", refused(grouped, ""));
+    }
+    let json = propagation("{}").to_json();
+    let expected =
+        "field `json`: it is the result of a propagation, and the job is a identification";
+    assert_eq!(refused(false, &json), expected);
 }

@@ -1,12 +1,11 @@
-use osteon_common::inference::Conclusions;
-use osteon_common::job::{Objective, PosteriorSettings, Sampling, Search};
-use osteon_common::results::{JobFailure, JobResult};
-use osteon_common::settings::{Picking, SolverSettings};
-use osteon_common::version::Program;
+use osteon_common::job::PosteriorSettings;
+use osteon_common::results::JobFailure;
+use serde_json::json;
 
 use super::*;
+use crate::fetched::SetSamples;
 use crate::listener::Silent;
-use crate::sample_result::drawn_posterior;
+use crate::sample_result::{drawn_posterior, identification};
 
 pub(crate) fn specification() -> JobSpecification {
     let values = [
@@ -25,31 +24,20 @@ pub(crate) fn specification() -> JobSpecification {
     job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification).unwrap()
 }
 
+/// The output of a job that ended so, without a best point.
 pub(crate) fn fetched(status: Status) -> Fetched {
-    let result = JobResult {
+    let failure = (status == Status::Failed).then_some(JobFailure::NoFeasiblePoint);
+    let partial = json!({
+        "status": status, "failure": failure, "reason": null, "dispersion": null, "posterior": null,
+    });
+    Fetched {
+        specification: specification(),
         status,
-        failure: (status == Status::Failed).then_some(JobFailure::NoFeasiblePoint),
         reason: None,
-        digest: "00".to_owned(),
-        best: None,
-        data: None,
-        conclusions: Conclusions::default(),
-        objective: Objective::Moments,
-        search: Search::default(),
-        groups: Vec::new(),
-        evaluations: 0,
-        realizations: 2747,
-        seed: 1,
-        sampling: Sampling::MonteCarlo,
-        scrambles: 1,
-        control_variate: false,
-        solver: SolverSettings::default(),
-        nominal: None,
-        picking: Picking::default(),
-        program: Program::current(None),
-        integrity: None,
-    };
-    Fetched { specification: specification(), result, history: Vec::new() }
+        result: identification(&partial.to_string()),
+        history: Vec::new(),
+        samples: vec![SetSamples::default()],
+    }
 }
 
 #[test]
@@ -60,8 +48,8 @@ fn only_a_run_that_ended_by_itself_is_finished_and_needs_no_store() {
         let directory = ResultsDirectory::open(&path).unwrap();
         let request = directory.request().unwrap();
         fs::create_dir(directory.store()).unwrap();
-        let written =
-            directory.write_results(JobKind::Identification, &fetched(status), &Silent).unwrap();
+        let written = fetched(status).result;
+        directory.write_results(&fetched(status), &Silent).unwrap();
 
         let ended = status != Status::Cancelled;
         let finished = ResultsDirectory::finished(&path, &specification()).unwrap();
@@ -80,9 +68,8 @@ fn a_directory_belongs_to_one_specification() {
     let scratch = tempfile::tempdir().unwrap();
     let directory = ResultsDirectory::open(scratch.path()).unwrap();
     let specification = specification();
-    let written = directory
-        .write_results(JobKind::Identification, &fetched(Status::Converged), &Silent)
-        .unwrap();
+    let written = fetched(Status::Converged).result;
+    directory.write_results(&fetched(Status::Converged), &Silent).unwrap();
     let stored = |specification| ResultsDirectory::stored(scratch.path(), specification);
     assert_eq!(stored(&specification).unwrap(), Some(written));
     let mut other = specification.clone();
@@ -95,7 +82,7 @@ fn a_directory_belongs_to_one_specification() {
 fn a_damaged_result_is_refused_with_the_key_and_what_to_do() {
     let scratch = tempfile::tempdir().unwrap();
     let directory = ResultsDirectory::open(scratch.path()).unwrap();
-    directory.write_results(JobKind::Identification, &fetched(Status::Converged), &Silent).unwrap();
+    directory.write_results(&fetched(Status::Converged), &Silent).unwrap();
     let path = scratch.path().join(RESULT);
     let text = fs::read_to_string(&path).unwrap();
     let refused = |text: String| {
@@ -104,7 +91,7 @@ fn a_damaged_result_is_refused_with_the_key_and_what_to_do() {
         assert!(matches!(failure, RunError::BadInput(_)));
         failure.to_string()
     };
-    let refusal = refused(text.replace("\"seed\": 1", "\"seed\": -1"));
+    let refusal = refused(text.replace("\"seed\": ", "\"seed\": -"));
     for part in ["result.json", "`seed`: invalid value", "line", "remove the file", "directory"] {
         assert!(refusal.contains(part), "{refusal}");
     }
@@ -123,7 +110,7 @@ fn the_draws_have_a_file_if_the_job_asks_for_them() {
         let directory = ResultsDirectory::open(scratch.path()).unwrap();
         let mut fetched = fetched(Status::Converged);
         change(&mut fetched);
-        directory.write_results(JobKind::Identification, &fetched, &Silent).unwrap();
+        directory.write_results(&fetched, &Silent).unwrap();
         let provenance = fs::read_to_string(scratch.path().join("provenance.json")).unwrap();
         let text = fs::read_to_string(scratch.path().join(POSTERIOR)).ok();
         assert_eq!(provenance.contains(POSTERIOR), text.is_some(), "{provenance}");
@@ -136,7 +123,7 @@ fn the_draws_have_a_file_if_the_job_asks_for_them() {
     assert_eq!(written(&asks), Some(1));
     let found = |fetched: &mut Fetched| {
         asks(fetched);
-        fetched.result.conclusions.posterior = Some(drawn_posterior());
+        fetched.samples[0].draws = drawn_posterior().draws;
     };
     assert_eq!(written(&found), Some(3));
 }
@@ -150,7 +137,7 @@ fn a_directory_is_held_until_everything_is_written() {
         assert!(failure.to_string().contains("another osteon is running"), "{what}: {failure}");
     };
     refused("opened");
-    directory.write_results(JobKind::Identification, &fetched(Status::Converged), &Silent).unwrap();
+    directory.write_results(&fetched(Status::Converged), &Silent).unwrap();
     refused("written");
     drop(directory);
     assert!(!scratch.path().join(LOCK).exists());
@@ -176,9 +163,10 @@ fn a_run_that_failed_because_of_its_machines_is_run_again_from_nothing() {
     let directory = ResultsDirectory::open(&path).unwrap();
     let request = directory.request().unwrap();
     let mut failed = fetched(Status::Failed);
-    failed.result.failure = Some(JobFailure::IntegrityError);
-    failed.result.reason = Some("integrity error: realization 3 is …".to_owned());
-    directory.write_results(JobKind::Identification, &failed, &Silent).unwrap();
+    failed.result = identification(
+        r#"{"status": "failed", "failure": "integrity_error", "reason": "realization 3 is …"}"#,
+    );
+    directory.write_results(&failed, &Silent).unwrap();
     assert_eq!(ResultsDirectory::finished(&path, &specification()).unwrap(), None);
     assert!(!directory.store().exists());
     assert_ne!(directory.request().unwrap(), request);

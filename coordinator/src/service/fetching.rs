@@ -6,13 +6,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures::{Stream, StreamExt as _, stream};
+use osteon_common::conclusions::Conclusions;
 use osteon_common::limits::{FETCH_SECONDS_MAX, READER_STALL_SECONDS_MAX};
+use osteon_common::outcome::Outcome;
 use osteon_common::outcomes::Outcomes;
-use osteon_common::results::{Integrity, JobResult};
-use osteon_proto::results::ResultBlocks;
+use osteon_common::posterior::PosteriorDraw;
+use osteon_common::results::{BestPoint, Integrity, JobResult};
+use osteon_files::report::{Group, ResultFile};
+use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::v1::fetch_response::Part;
-use osteon_proto::v1::{FetchResponse, HistoryBlock};
-use osteon_proto::{posterior, realizations, results, specification};
+use osteon_proto::v1::{self, FetchResponse, HistoryBlock};
+use osteon_proto::{draws, history, realizations, specification};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::spawn_blocking;
 use tokio::time::{Instant, sleep, timeout};
@@ -87,28 +91,34 @@ pub(crate) async fn send_all(
     let left = Arc::new(reader.kept_waiting(left(&store, end)).await?);
     reader.send(Part::Specification(specification::to_message(&left.specification))).await?;
     let of_best = reader.kept_waiting(outcomes(&store, job, left.best())).await?;
-    let (message, blocks) = computed(&left, &reader, move |left| {
+    let (message, samples) = computed(&left, &reader, move |left| {
         let result = JobResult { integrity, ..left.result(of_best) };
-        (results::to_message(&result), ResultBlocks::new(result.best, result.conclusions))
+        let message = v1::JobResult {
+            status: JOB_STATUS.number(result.status),
+            reason: result.reason.clone(),
+            json: ResultFile::from_job(left.specification.kind, &result).to_json(),
+        };
+        (message, Samples::new(result.best, result.conclusions))
     })
     .await?;
     reader.send(Part::Result(message)).await?;
     for rows in left.summary.history.chunks(HISTORY_BLOCK_ROWS) {
-        let rows = rows.iter().map(results::evaluation_to_message).collect();
+        let rows = rows.iter().map(history::evaluation_to_message).collect();
         reader.send(Part::History(HistoryBlock { rows, groups: Vec::new() })).await?;
     }
-    send_blocks(None, &blocks, &reader).await?;
+    send_samples(None, &samples, &reader).await?;
     for set in 0..left.groups() {
         let read = reader.kept_waiting(outcomes(&store, job, left.best_of(set))).await?;
         let number = u32::try_from(set).unwrap_or(u32::MAX);
         let found = computed(&left, &reader, move |left| {
             let found = left.group(set, read)?;
-            let message = results::group_to_message(number, &found);
-            Some((message, ResultBlocks::new(found.best, found.conclusions)))
+            let json = Group::new(left.specification.objective, &found).to_json();
+            let message = v1::GroupResult { group: number, json };
+            Some((message, Samples::new(found.best, found.conclusions)))
         });
-        let Some((message, blocks)) = found.await? else { continue };
+        let Some((message, samples)) = found.await? else { continue };
         reader.send(Part::Group(message)).await?;
-        send_blocks(Some(number), &blocks, &reader).await?;
+        send_samples(Some(number), &samples, &reader).await?;
     }
     Ok(())
 }
@@ -130,20 +140,37 @@ async fn computed<T: Send + 'static>(
     reader.kept_waiting(async { computing.await.map_err(failed) }).await
 }
 
+/// What was sampled for a set of data.
+struct Samples {
+    /// Outcomes at its best point.
+    outcomes: Vec<Outcome>,
+    /// Draws from its posterior.
+    draws: Vec<PosteriorDraw>,
+}
+
+impl Samples {
+    fn new(best: Option<BestPoint>, conclusions: Conclusions) -> Self {
+        Self {
+            outcomes: best.map(|best| best.outcomes).unwrap_or_default(),
+            draws: conclusions.posterior.map(|posterior| posterior.draws).unwrap_or_default(),
+        }
+    }
+}
+
 /// Sends the realizations at the best point of a set of data, then the draws from its posterior.
-async fn send_blocks(
+async fn send_samples(
     group: Option<u32>,
-    blocks: &ResultBlocks,
+    samples: &Samples,
     reader: &FetchStream,
 ) -> Result<(), StreamEnd> {
-    for (block, outcomes) in blocks.outcomes.chunks(REALIZATION_BLOCK).enumerate() {
+    for (block, outcomes) in samples.outcomes.chunks(REALIZATION_BLOCK).enumerate() {
         let first = (block * REALIZATION_BLOCK) as u64;
         let block = realizations::to_message(group, first, outcomes);
         reader.send(Part::Realizations(block)).await?;
     }
-    for (block, draws) in blocks.draws.chunks(DRAW_BLOCK).enumerate() {
+    for (block, draws) in samples.draws.chunks(DRAW_BLOCK).enumerate() {
         let first = (block * DRAW_BLOCK) as u64;
-        reader.send(Part::Draws(posterior::draws_to_message(group, first, draws))).await?;
+        reader.send(Part::Draws(draws::draws_to_message(group, first, draws))).await?;
     }
     Ok(())
 }
@@ -257,7 +284,6 @@ mod tests {
 
     use futures::FutureExt as _;
     use osteon_common::parameters::Point;
-    use osteon_common::posterior::PosteriorDraw;
     use prost::Message as _;
     use tokio::sync::{OwnedSemaphorePermit, Semaphore};
     use tokio::time::advance;
@@ -395,9 +421,9 @@ mod tests {
             mean: 3900.0,
             coefficient_of_variation: 0.03,
         };
-        let blocks = ResultBlocks { outcomes: vec![Ok(3900.0)], draws: vec![draw; DRAW_BLOCK + 1] };
+        let samples = Samples { outcomes: vec![Ok(3900.0)], draws: vec![draw; DRAW_BLOCK + 1] };
         let stream =
-            paced((), |reader| async move { send_blocks(Some(3), &blocks, &reader).await });
+            paced((), |reader| async move { send_samples(Some(3), &samples, &reader).await });
         let parts: Vec<_> = stream.map(|part| part.unwrap().part.unwrap()).collect().await;
         let [Part::Realizations(_), Part::Draws(first), Part::Draws(last)] = parts.as_slice()
         else {

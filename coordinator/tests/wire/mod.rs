@@ -1,12 +1,9 @@
 //! The results of an identification that a client can get from the messages alone.
 
-use osteon_common::job::JobKind;
 use osteon_common::outcome::Outcome;
-use osteon_common::results::JobResult;
-use osteon_files::report::ResultFile;
+use osteon_files::report::{Group, ResultFile};
 use osteon_files::results_csv;
-
-use osteon_proto::results::ResultBlocks;
+use osteon_proto::history;
 use osteon_proto::v1::{GroupResult, HistoryBlock, JobResult as ResultMessage};
 
 use super::*;
@@ -51,18 +48,16 @@ async fn fetched(job: &osteon_common::job::JobSpecification) -> Parts {
     left
 }
 
-/// Returns the result that a client makes of the parts.
-fn result(parts: &Parts) -> JobResult {
-    let of = |group: Option<u32>| {
-        let found = parts.realizations.iter().find(|(of, _)| *of == group);
-        let outcomes = found.map(|(_, outcomes)| outcomes.clone()).unwrap_or_default();
-        ResultBlocks { outcomes, ..ResultBlocks::default() }
-    };
-    let groups = parts
-        .groups
-        .iter()
-        .map(|group| results::group_from_message(group, of(Some(group.group))).unwrap());
-    results::from_message(&parts.result, of(None), groups.collect()).unwrap()
+/// Returns the result that the parts have.
+fn result(parts: &Parts) -> ResultFile {
+    let mut result = ResultFile::from_json(&parts.result.json).unwrap();
+    if let ResultFile::Identification(found) = &mut result
+        && !parts.groups.is_empty()
+    {
+        let group = |part: &GroupResult| Group::from_json(&part.json).unwrap();
+        found.groups = Some(parts.groups.iter().map(group).collect());
+    }
+    result
 }
 
 /// The files are those that clients used to compute by themselves from evaluations and data.
@@ -78,55 +73,37 @@ async fn a_result_needs_no_more_than_the_wire() {
             "grouped" => include_str!("grouped.json"),
             other => panic!("{other} has no file"),
         };
-        let written = ResultFile::from_job(JobKind::Identification, &result).to_json();
-        assert_eq!(written, expected, "{name}");
+        assert_eq!(result.to_json(), expected, "{name}");
         assert_eq!(ResultFile::from_json(expected).unwrap().to_json(), expected, "{name}");
         if name == "grouped" {
             let rows = parts.history.iter().flat_map(|block| &block.rows);
             let history: Vec<_> =
-                rows.map(|row| results::evaluation_from_message(row).unwrap()).collect();
-            let groups = results_csv::groups(&job, &result, &history);
-            let tables = groups + &results_csv::comparison(&result);
+                rows.map(|row| history::evaluation_from_message(row).unwrap()).collect();
+            let groups = results_csv::groups(&job, result.groups(), &history);
+            let tables = groups + &results_csv::comparison(result.groups());
             assert_eq!(tables, include_str!("grouped.csv"));
         }
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn messages_hold_the_uncertainty() {
+async fn realizations_and_derivatives_come_in_blocks() {
     let [(_, several), .., (_, grouped)] = jobs::jobs();
-    let Parts { result, history, realizations, .. } = fetched(&several).await;
-    assert_eq!(result.sensitivities.len(), 7);
-    let identified = result.identified.unwrap();
-    // With free directions only a posterior has intervals.
-    let bulk = identified.bulk_velocity.unwrap();
-    assert!(bulk.value > Some(0.0) && bulk.interval.is_none(), "{bulk:?}");
-    assert_eq!((identified.directions.len(), identified.free_directions.len()), (2, 5));
-    assert_eq!(result.profiles.len(), 7);
-    let solutions = result.solutions.unwrap();
-    assert_eq!((solutions.points.len(), solutions.mandel.len()), (3, 21));
-    let data = result.data.unwrap();
-    assert_eq!(data.count, Some(40));
-    let of_mean = data.intervals.unwrap().mean.unwrap();
-    assert!(of_mean.lower < Some(3900.0) && Some(3900.0) < of_mean.upper, "{of_mean:?}");
-    let best = result.best.unwrap();
-    assert_ne!(best.meaning(), osteon_proto::v1::PointMeaning::Unspecified);
+    let Parts { history, realizations, .. } = fetched(&several).await;
     let varied = history.iter().flat_map(|block| &block.rows).filter(|row| row.varied.is_some());
     assert_eq!(varied.count(), 7);
     assert!(realizations.iter().all(|(group, outcomes)| group.is_none() && outcomes.len() == 300));
 
-    let Parts { result, groups, realizations, .. } = fetched(&grouped).await;
-    assert!(result.best.is_none() && result.data.is_none() && result.identified.is_none());
-    let names: Vec<&str> = groups.iter().map(|group| group.name.as_str()).collect();
-    assert_eq!(names, ["left", "right, \"distal\""]);
-    let whose: Vec<Option<u32>> = realizations.iter().map(|(group, _)| *group).collect();
+    let parts = fetched(&grouped).await;
+    let whose: Vec<Option<u32>> = parts.realizations.iter().map(|(group, _)| *group).collect();
     assert_eq!(whose, [Some(0), Some(1)]);
-    for (group, (_, outcomes)) in groups.iter().zip(&realizations) {
-        let dispersion = group.identified.as_ref().unwrap().dispersion.unwrap();
-        assert!(dispersion.value.is_some() && dispersion.interval.is_none());
+    let result = result(&parts);
+    let names: Vec<&str> = result.groups().iter().map(|group| group.name.as_str()).collect();
+    assert_eq!(names, ["left", "right, \"distal\""]);
+    for (group, (_, outcomes)) in result.groups().iter().zip(&parts.realizations) {
         let velocities: Vec<f64> = outcomes.iter().filter_map(|outcome| outcome.ok()).collect();
         let mean = velocities.iter().sum::<f64>() / velocities.len() as f64;
-        let found = group.best.as_ref().unwrap().velocity.unwrap().moments.unwrap().mean;
+        let found = group.velocity.moments.mean.unwrap();
         // Both sum in double precision, in different orders.
         assert!((mean / found - 1.0).abs() < 1e-12, "{mean}, {found}");
     }

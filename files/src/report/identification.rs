@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use super::conclusions::{Identified, ParameterProfile, Solutions, profiles, sensitivities};
 use super::schema::{keyed_by_failure, keyed_by_parameter};
 use super::{
-    Data, EstimatedErrors, IntegrityReport, MeanModel, MomentSlopes, PosteriorReport, Solver,
-    Velocity, absent_or_nullable, finite_or_null,
+    Data, EstimatedErrors, IntegrityReport, MeanModel, MomentSlopes, PosteriorReport, ReadError,
+    Solver, Velocity, absent_or_nullable, finite_or_null, parse, to_pretty_json,
 };
 
 /// The point that fits the data best, and what the data say of it. Where the data are groups, each
@@ -264,7 +264,8 @@ pub struct Group {
 }
 
 impl Group {
-    fn new(objective: Objective, group: &GroupResult) -> Self {
+    /// Returns the result of a group of a job with this objective.
+    pub fn new(objective: Objective, group: &GroupResult) -> Self {
         let best = group.best.as_ref();
         let found = BestPointKeys::new(objective, best);
         let inference = group.conclusions.inference.as_ref();
@@ -286,6 +287,24 @@ impl Group {
             solutions: group.conclusions.solutions.as_ref().map(Solutions::from),
             posterior: group.conclusions.posterior.as_ref().map(PosteriorReport::from),
         }
+    }
+
+    /// Returns the text of an entry of `groups` by itself.
+    pub fn to_json(&self) -> String {
+        to_pretty_json(self)
+    }
+
+    /// Reads an entry of `groups` by itself.
+    ///
+    /// # Errors
+    /// If the text is not JSON, or a key is absent or wrong.
+    pub fn from_json(text: &str) -> Result<Self, ReadError> {
+        parse(text)
+    }
+
+    /// Returns the best point, if one was feasible.
+    pub fn best_point(&self) -> Option<Point> {
+        self.parameters.point(self.dispersion)
     }
 }
 

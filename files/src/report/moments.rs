@@ -1,7 +1,7 @@
 //! The objects `velocity` and `data`: moments of the model and of the data, and what is known of them.
 
 use osteon_common::moments::{ConfidenceInterval, DecayEstimate, KolmogorovTest, Outlier};
-use osteon_common::results::{self, BestPoint, DataSummary};
+use osteon_common::results::{self, BestPoint, DataSummary, Estimate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -68,6 +68,24 @@ pub struct Velocity {
     pub controlled: Option<bool>,
     /// Change of the moments that is expected if the failed realizations had succeeded.
     pub failure_bias: Moments,
+}
+
+impl Velocity {
+    /// Returns the moments with their standard errors, NaN where these are not known; `None` where there are
+    /// no moments.
+    pub fn estimate(&self) -> Option<Estimate> {
+        let moments = |found: Moments, unknown: Option<f64>| {
+            Some(results::Moments {
+                mean: found.mean.or(unknown)?,
+                coefficient_of_variation: found.coefficient_of_variation.or(unknown)?,
+            })
+        };
+        Some(Estimate {
+            moments: moments(self.moments, None)?,
+            standard_error: moments(self.standard_error, Some(f64::NAN))?,
+            controlled: self.controlled?,
+        })
+    }
 }
 
 impl From<Option<&BestPoint>> for Velocity {

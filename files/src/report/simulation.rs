@@ -45,7 +45,7 @@ pub struct Simulation {
 impl Simulation {
     /// The text of the file, with a final newline.
     pub fn to_json(&self) -> String {
-        super::to_pretty_json(DocumentContent::Simulation(self))
+        super::document(DocumentContent::Simulation(self))
     }
 
     /// Reads the text of a `result.json`. Unknown keys are ignored.

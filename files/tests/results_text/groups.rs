@@ -76,7 +76,7 @@ fn grouped() -> (JobSpecification, JobResult, Vec<Evaluation>) {
 #[test]
 fn a_group_has_its_intervals_its_data_and_a_reason() {
     let (job, mut result, history) = grouped();
-    let text = results_csv::groups(&job, &result, &history);
+    let text = results_csv::groups(&job, &groups_of(&result), &history);
     let rows = rows(&text);
     for (group, column, value) in [
         (0, "longitudinal_young_modulus", "17717000000.0"),
@@ -106,24 +106,17 @@ fn a_group_has_its_intervals_its_data_and_a_reason() {
     assert!(text.ends_with(",\"only one velocity, and no more\"\n"), "{text}");
     // Where nothing else is said, a blank is explained.
     result.groups[1].reason = None;
-    let text = results_csv::groups(&job, &result, &history);
+    let text = results_csv::groups(&job, &groups_of(&result), &history);
     assert!(text.contains(",the model does not match the data within their noise: no intervals\n"));
 }
 
 #[test]
 fn realizations_of_groups_follow_each_other() {
-    let best = result().best.unwrap();
-    let groups = [
-        group("left", Status::Converged, Some(best.clone())),
-        group("none", Status::Failed, None),
-        group(
-            "right, \"distal\"",
-            Status::Converged,
-            Some(BestPoint { outcomes: vec![Ok(3900.5)], ..best }),
-        ),
-    ];
+    let outcomes = outcomes();
+    let groups =
+        [("left", outcomes.as_slice()), ("none", &[]), ("right, \"distal\"", &[Ok(3900.5)])];
     assert_eq!(
-        results_csv::realizations_of_groups(&groups),
+        results_csv::realizations_of_groups(groups),
         "index,velocity,failure,group\n0,3908.25,,left\n1,,direct_wave_first,left\n\
          2,3333.3333333333335,,left\n3,,no_arrival,left\n0,3900.5,,\"right, \"\"distal\"\"\"\n"
     );

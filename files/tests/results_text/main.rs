@@ -25,7 +25,7 @@ use osteon_common::sampling::NominalSampling;
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_common::version::Program;
 use osteon_files::document::Format;
-use osteon_files::report::{MeanModel, ReadError, ResultFile, Solver};
+use osteon_files::report::{Group as ResultGroup, MeanModel, ReadError, ResultFile, Solver};
 use osteon_files::{job_file, results_csv};
 
 const POINT: Point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
@@ -96,6 +96,10 @@ fn result() -> JobResult {
 
 fn identification_text(result: &JobResult) -> String {
     ResultFile::from_job(JobKind::Identification, result).to_json()
+}
+
+fn groups_of(result: &JobResult) -> Vec<ResultGroup> {
+    ResultFile::from_job(JobKind::Identification, result).groups().to_vec()
 }
 
 fn propagation_text(result: &JobResult) -> String {

@@ -124,7 +124,7 @@ fn the_posterior_of_each_group() {
 #[test]
 fn tables_of_groups_have_the_means_and_intervals_of_the_posteriors() {
     let result = of_groups();
-    let text = results_csv::groups(&specification(), &result, &[]);
+    let text = results_csv::groups(&specification(), &groups_of(&result), &[]);
     let rows: Vec<Vec<&str>> = text.lines().take(3).map(|line| line.split(',').collect()).collect();
     let cells = |row: usize, name: &str| {
         ["", "_lower", "_upper"].map(|end| {
@@ -136,7 +136,7 @@ fn tables_of_groups_have_the_means_and_intervals_of_the_posteriors() {
     assert_eq!(cells(1, "dispersion"), ["0.125", "0.03125", "0.25"]);
     assert_eq!(cells(2, "bulk_velocity"), ["", "", ""]);
     // Both ends are as far from the difference as those of both intervals together.
-    let compared = results_csv::comparison(&result);
+    let compared = results_csv::comparison(&groups_of(&result));
     let row = compared.lines().find(|line| line.starts_with("left,\"right")).unwrap();
     assert!(row.ends_with(",0.0,-5120.0,5120.0,0.0,-0.15625,0.15625"), "{row}");
 }
@@ -167,11 +167,11 @@ const ROWS: [&str; 2] = [
 
 #[test]
 fn draws_are_rows() {
-    let mut result = result();
-    assert_eq!(posterior_csv::posterior(&specification(), &result), format!("{HEADER}\n"));
-    result.conclusions.posterior = Some(posterior());
+    let none: [&[PosteriorDraw]; 1] = [&[]];
+    assert_eq!(posterior_csv::posterior(&specification(), none), format!("{HEADER}\n"));
+    let draws = posterior().draws;
     assert_eq!(
-        posterior_csv::posterior(&specification(), &result),
+        posterior_csv::posterior(&specification(), [draws.as_slice()]),
         format!("{HEADER}\n{}\n{}\n", ROWS[0], ROWS[1])
     );
 }
@@ -189,18 +189,20 @@ fn the_columns_are_documented() {
     for parameter in Parameter::ALL.into_iter().filter(|one| one.of_setup().is_some()) {
         job.parameters[parameter as usize] = Range::Free { start: 1.0, lower: 0.5, upper: 2.0 };
     }
-    let text = posterior_csv::posterior(&job, &of_groups());
+    let text = posterior_csv::posterior(&job, []);
     let real: Vec<&str> = text.lines().next().unwrap().split(',').collect();
     assert_eq!(told, real);
 }
 
 #[test]
 fn draws_of_groups_follow_each_other() {
-    let groups = vec![Group::new("left", vec![3900.0, 3950.0])];
+    let groups = ["left", "lonely", "right, \"distal\""];
+    let groups = groups.map(|name| Group::new(name, vec![3900.0, 3950.0])).to_vec();
     let job = JobSpecification { data: Some(Data::from_groups(groups)), ..specification() };
+    let draws = posterior().draws;
     let rows = |name: &str| ROWS.map(|row| format!("{row},{name}\n")).concat();
     assert_eq!(
-        posterior_csv::posterior(&job, &of_groups()),
+        posterior_csv::posterior(&job, [draws.as_slice(), &[], draws.as_slice()]),
         format!("{HEADER},group\n{}{}", rows("left"), rows("\"right, \"\"distal\"\"\""))
     );
 }

@@ -3,7 +3,7 @@
 //! that is read is written and read again, unchanged.
 
 use osteon_fuzz::{CASES, bounded, bytes, check, damaged, here};
-use osteon_proto::{results, v1};
+use osteon_proto::{history, v1};
 
 use super::columns::{evaluation_checksum, pack_errors, pack_outcomes, pack_point, pack_workers};
 use super::summary::summary_checksum;
@@ -81,7 +81,7 @@ fn check_history(store: &mut SqliteStore, damage: &[u8]) {
     let sql = "UPDATE summary SET history = ?1, checksum = ?2 WHERE job = 1";
     assert_eq!(store.connection.execute(sql, params![damage, checksum]).unwrap(), 1);
     if let Some(read) = accepted(bounded(damage.len(), || store.summary(JOB))) {
-        let again = |row| results::evaluation_from_message(&results::evaluation_to_message(row));
+        let again = |row| history::evaluation_from_message(&history::evaluation_to_message(row));
         let history: Result<Vec<_>, _> = read.history.iter().map(again).collect();
         assert_eq!(format!("{:?}", history.unwrap()), format!("{:?}", read.history));
     }
@@ -124,7 +124,7 @@ mod on_random_cases {
     #[test]
     fn damaged_histories_are_refused_or_read() {
         let mut seeds = bytes("store");
-        let rows = summary(1).history.iter().map(results::evaluation_to_message).collect();
+        let rows = summary(1).history.iter().map(history::evaluation_to_message).collect();
         seeds.push(v1::HistoryBlock { rows, groups: Vec::new() }.encode_to_vec());
         run(seeds, check_history);
     }

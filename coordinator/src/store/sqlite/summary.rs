@@ -1,7 +1,7 @@
 //! The table of summaries.
 
 use osteon_common::results::{Evaluation, GroupEnding};
-use osteon_proto::{results, v1};
+use osteon_proto::{history, v1};
 use osteon_search::Summary;
 use prost::Message as _;
 use rusqlite::{Connection, OptionalExtension as _, params};
@@ -11,8 +11,8 @@ use crate::core::ids::JobId;
 
 /// Writes a summary.
 pub(super) fn put(connection: &Connection, job: JobId, summary: &Summary) -> rusqlite::Result<()> {
-    let rows = summary.history.iter().map(results::evaluation_to_message).collect();
-    let groups = summary.groups.iter().map(results::group_ending_to_message).collect();
+    let rows = summary.history.iter().map(history::evaluation_to_message).collect();
+    let groups = summary.groups.iter().map(history::group_ending_to_message).collect();
     let history = v1::HistoryBlock { rows, groups }.encode_to_vec();
     let checksum = summary_checksum(job, &summary.digest, summary.best, &history);
     let sql = "INSERT OR REPLACE INTO summary VALUES (?1, ?2, ?3, ?4, ?5)";
@@ -38,8 +38,8 @@ pub(super) fn get(
 
 fn block(encoded: &[u8]) -> Option<(Vec<Evaluation>, Vec<GroupEnding>)> {
     let block = v1::HistoryBlock::decode(encoded).ok()?;
-    let rows = block.rows.iter().map(|row| results::evaluation_from_message(row).ok());
-    let groups = block.groups.iter().map(|group| results::group_ending_from_message(group).ok());
+    let rows = block.rows.iter().map(|row| history::evaluation_from_message(row).ok());
+    let groups = block.groups.iter().map(|group| history::group_ending_from_message(group).ok());
     Some((rows.collect::<Option<_>>()?, groups.collect::<Option<_>>()?))
 }
 
