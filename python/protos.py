@@ -1,6 +1,6 @@
 """Makes the messages and stubs of `osteon.v1` that the package ships, from the .proto files of its API for
-clients; with --check, fails if those in the repository are not what it makes. `cargo xtask stubs` and
-`cargo xtask python` call it; the requirements of the tests pin the generators."""
+clients; with --check, fails if those in the repository are not what it makes. `cargo xtask generate stubs` and
+`cargo xtask test python` call it; the requirements of the tests pin the generators."""
 
 import argparse
 import pathlib
@@ -54,7 +54,7 @@ def main():
         return
     if arguments.check:
         changed = sorted(name for name in {*shipped, *made} if shipped.get(name) != made.get(name))
-        sys.exit(f"not made from proto/: {', '.join(changed)}; run `cargo xtask stubs`")
+        sys.exit(f"not made from proto/: {', '.join(changed)}; run `cargo xtask generate stubs`")
     for name in shipped:
         (SHIPPED / name).unlink()
     for name, text in made.items():

@@ -1,6 +1,6 @@
 """Builds wheels for Linux with a glibc from 2.17 on (manylinux2014), for x86_64 and aarch64, by maturin and the
 linker of Zig, which brings the headers and symbols of old glibcs for every processor. Uses the standard library
-only; `cargo xtask wheels` calls it.
+only; `cargo xtask package wheels` calls it.
 
 maturin builds the module; cargo-zigbuild builds the program, which is placed among maturin's scripts, as
 `backend/osteon_build.py` does for this machine."""

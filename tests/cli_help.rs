@@ -47,7 +47,7 @@ fn help_of_every_command() {
 
 /// What docs/cli.md says before the commands.
 const PAGE_HEAD: &str = "\
-<!-- Written by `cargo xtask reference`; do not edit. -->
+<!-- Written by `cargo xtask generate reference`; do not edit. -->
 
 # Command line
 
@@ -76,7 +76,7 @@ fn the_page_of_commands_is_that_of_the_program() {
         fs::write(&path, &page).unwrap();
     }
     let committed = fs::read_to_string(&path).unwrap_or_default();
-    assert!(committed == page, "docs/cli.md is stale; `cargo xtask reference` writes it");
+    assert!(committed == page, "docs/cli.md is stale; `cargo xtask generate reference` writes it");
 }
 
 #[test]

@@ -286,6 +286,6 @@ fn the_tables_of_keys_are_those_of_the_program() {
     if std::env::var_os("OSTEON_WRITE_DOCS").is_some() {
         fs::write(&path, &current).unwrap();
     } else {
-        assert!(page == current, "after a change: cargo xtask reference");
+        assert!(page == current, "after a change: cargo xtask generate reference");
     }
 }

@@ -1,4 +1,4 @@
-//! A small `cargo xtask bench-fleet`: what it measures is not asserted, that it measures the same job is.
+//! A small `cargo xtask bench fleet`: what it measures is not asserted, that it measures the same job is.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -29,7 +29,7 @@ use measured::{HEADER, measure};
 
 fn rows(words: &str) -> Result<Vec<Row>, String> {
     let words = words.split_whitespace();
-    let arguments = FleetArguments::try_parse_from(["bench-fleet"].into_iter().chain(words));
+    let arguments = FleetArguments::try_parse_from(["bench fleet"].into_iter().chain(words));
     arguments.map_err(|error| error.to_string())?.rows().map_err(|error| error.to_string())
 }
 

@@ -17,7 +17,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 use support::{Owned, Scratch, job, osteon, run, text};
 
-/// Names the directory for what `cargo xtask metrics` gives to promtool: the scraped text, and the
+/// Names the directory for what `cargo xtask test metrics` gives to promtool: the scraped text, and the
 /// expressions of the dashboard as rules.
 const DIRECTORY: &str = "OSTEON_METRICS_DIRECTORY";
 

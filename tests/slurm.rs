@@ -1,4 +1,4 @@
-//! The commands for Slurm, with stand-ins for Slurm's commands. `cargo xtask slurm` tests them on a
+//! The commands for Slurm, with stand-ins for Slurm's commands. `cargo xtask test slurm` tests them on a
 //! real one.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]

@@ -1,5 +1,5 @@
 //! Spans from a submission to the computation of its batches, at a collector that is part of the test.
-//! Only with the feature `otel`: `cargo xtask tracing`.
+//! Only with the feature `otel`: `cargo xtask test tracing`.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 

@@ -16,7 +16,7 @@ const IDEAL_MAX: Duration = Duration::from_secs(3600);
 
 /// Measures jobs on fleets of simulated workers at a real coordinator: one row for each fleet.
 #[derive(Debug, Parser)]
-#[command(name = "cargo xtask bench-fleet", max_term_width = 80)]
+#[command(name = "cargo xtask bench fleet", max_term_width = 80)]
 pub(crate) struct FleetArguments {
     /// Numbers of workers, 1 to 4096 each, one fleet after the other
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "10,30,100,300,1000",

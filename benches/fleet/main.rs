@@ -1,5 +1,5 @@
 //! Whether jobs get slower as workers are added: a fleet of simulated workers over real gRPC streams
-//! at a real coordinator. `cargo xtask bench-fleet --help`
+//! at a real coordinator. `cargo xtask bench fleet --help`
 //!
 //! The coordinator is a process of its own with its durable store. The workers are tasks of this process,
 //! each with its own connection and stream. They speak as `osteon worker` does, but compute nothing:

@@ -2,7 +2,7 @@
 
 Runs each system in turns, so that other load of the machine meets all of them, and prints the best of the
 rounds as a table. The other systems are installed into a virtual environment, with the versions of
-requirements.txt. `cargo xtask bench-peers` builds what is needed and calls this.
+requirements.txt. `cargo xtask bench peers` builds what is needed and calls this.
 """
 
 import argparse

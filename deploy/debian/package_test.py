@@ -25,7 +25,7 @@ class Package(unittest.TestCase):
         program = cls.directory / "target" / "release" / "osteon"
         program.parent.mkdir(parents=True)
         shutil.copy(OSTEON, program)
-        # What `cargo xtask man` writes.
+        # What `cargo xtask package man` writes.
         output(OSTEON, "man", program.parent / "man")
         completions = program.parent / "completions"
         completions.mkdir()

@@ -25,14 +25,18 @@ fn sections_of_python_are_the_committed() {
         fs::write(&path, &text).unwrap();
     }
     let committed = fs::read_to_string(&path).unwrap_or_default();
-    assert!(committed == text, "{} differs; `cargo xtask reference` writes it", path.display());
+    assert!(
+        committed == text,
+        "{} differs; `cargo xtask generate reference` writes it",
+        path.display()
+    );
 }
 
 /// Returns the module.
 fn module(schema: &Value) -> String {
     let mut text = "\"\"\"The sections of a job: the keyword arguments of :class:`osteon.Job`.\n\n\
                     Every key may be left out unless it says otherwise; units are SI.\n\n\
-                    Written by `cargo xtask reference`; do not edit.\"\"\"\n\n\
+                    Written by `cargo xtask generate reference`; do not edit.\"\"\"\n\n\
                     from __future__ import annotations\n\n\
                     from collections.abc import Sequence\n\
                     from typing import Literal, TypedDict\n"

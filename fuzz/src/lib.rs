@@ -4,7 +4,7 @@
 //!
 //! A test of a parser reads every seed unchanged, then many damaged ones, and checks that nothing
 //! panics, that no input takes more processor time than its length justifies, and that an accepted
-//! input is accepted again, with the same meaning, after it is written out. `cargo xtask random`
+//! input is accepted again, with the same meaning, after it is written out. `cargo xtask test random`
 //! runs more such cases.
 
 #![forbid(unsafe_code)]

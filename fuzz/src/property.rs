@@ -36,7 +36,7 @@ const KEPT: &str = "regressions";
 ///
 /// It replaces `proptest!`, where environment variables override the settings. Without `cases`
 /// there are [`CASES`]. The test is called `sums_have_no_order::on_random_cases`; by the last part
-/// of this name `cargo xtask random` finds all of them.
+/// of this name `cargo xtask test random` finds all of them.
 #[macro_export]
 macro_rules! properties {
     (@run $cases:expr; $(

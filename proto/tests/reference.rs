@@ -16,7 +16,7 @@ use prost_types::{
 };
 
 const HEAD: &str = "\
-<!-- Written by `cargo xtask reference`; do not edit. -->
+<!-- Written by `cargo xtask generate reference`; do not edit. -->
 
 # gRPC: services and messages
 
@@ -67,7 +67,7 @@ fn the_page_of_messages_is_that_of_the_files() {
     let committed = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         committed == page,
-        "docs/grpc-reference.md is stale; `cargo xtask reference` writes it"
+        "docs/grpc-reference.md is stale; `cargo xtask generate reference` writes it"
     );
 }
 

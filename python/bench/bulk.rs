@@ -1,4 +1,4 @@
-//! The side in Rust of `cargo xtask bench-python`: computes the velocities of tensors that it is sent,
+//! The side in Rust of `cargo xtask bench python`: computes the velocities of tensors that it is sent,
 //! as `osteon.velocities` does, whenever it is told to, and says how long each time took.
 //!
 //! Arguments: a case file, the number of threads and that of tensors. On stdin: the tensors, as doubles

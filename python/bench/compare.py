@@ -2,7 +2,7 @@
 program in Rust (bulk.rs) that is sent the same tensors; and the time of `import osteon`.
 
 Both sides compute in turns, so that other load of the machine meets both, on one thread and on all cores;
-the smallest time of all rounds is printed, and the smallest time of processors, which depends less on other load. `cargo xtask bench-python` builds both in release
+the smallest time of all rounds is printed, and the smallest time of processors, which depends less on other load. `cargo xtask bench python` builds both in release
 mode, installs the wheel in a virtual environment, and runs this there."""
 
 import argparse

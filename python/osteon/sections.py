@@ -2,7 +2,7 @@
 
 Every key may be left out unless it says otherwise; units are SI.
 
-Written by `cargo xtask reference`; do not edit."""
+Written by `cargo xtask generate reference`; do not edit."""
 
 from __future__ import annotations
 

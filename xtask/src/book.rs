@@ -19,10 +19,10 @@ const OPTIONS: &[&str] = &["--no-default-features", "--features", "search", "--p
 /// The table of contents.
 const CONTENTS: &str = "SUMMARY.md";
 
-/// `cargo xtask book`.
+/// `cargo xtask docs`.
 pub(crate) fn build(words: &[String]) -> Result<()> {
     if !words.is_empty() {
-        bail!("usage: cargo xtask book");
+        bail!("usage: cargo xtask docs");
     }
     let book = programs()?.with_file_name("book");
     let (source, html) = (book.join("source"), book.join("html"));

@@ -4,7 +4,7 @@ use anyhow::{Context as _, Result, bail};
 
 use crate::process::{cargo, cargo_command};
 
-const USAGE: &str = "usage: cargo xtask chaos [--kills N] [--seed S]";
+const USAGE: &str = "usage: cargo xtask test chaos [--kills N] [--seed S]";
 /// Default number of kills of the coordinator, and of workers.
 const KILLS: u64 = 200;
 /// Name of the test.

@@ -19,10 +19,10 @@ const FETCH_MAX: Duration = Duration::from_secs(60);
 /// Interval at which the fetching process is polled.
 const POLL: Duration = Duration::from_millis(100);
 
-/// `cargo xtask deny`.
+/// `cargo xtask lint deny`.
 pub(crate) fn check(words: &[String]) -> Result<()> {
     if !words.is_empty() {
-        bail!("usage: cargo xtask deny");
+        bail!("usage: cargo xtask lint deny");
     }
     let program = installed("cargo-deny", VERSION, &[])?;
     let deny = |arguments: &[&str]| {

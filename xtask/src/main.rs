@@ -1,4 +1,4 @@
-//! All developer commands: `cargo xtask COMMAND`. CI calls `cargo xtask ci`.
+//! All developer commands: `cargo xtask COMMAND [PART]`. CI calls `cargo xtask ci`.
 
 #![forbid(unsafe_code)]
 
@@ -26,22 +26,31 @@ mod umbridge;
 use std::env;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 
 use crate::process::{cargo, cargo_command};
 
 /// A cargo invocation.
 type Cargo = &'static [&'static str];
 
-/// Action of a command.
+/// What a command, or a part of one, does.
 enum Action {
     /// Runs cargo.
     Cargo(&'static [Cargo]),
     /// Runs a function, which may take further words.
     Function(fn(&[String]) -> Result<()>),
-    /// Runs other commands: name and words of each.
-    Commands(&'static [&'static [&'static str]]),
 }
+
+/// A command: what it does by itself, and its parts, which run by their names.
+struct Verb {
+    name: &'static str,
+    what: &'static str,
+    action: Option<Action>,
+    parts: &'static [Part],
+}
+
+/// A part of a command: name, description and action.
+type Part = (&'static str, &'static str, Action);
 
 const FORMAT: Cargo = &["fmt", "--all", "--check"];
 const LINT: Cargo = &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
@@ -75,144 +84,181 @@ const BENCH: &[Cargo] = &[
     &["bench", "--package", "osteon-coordinator", "--bench", "fleet"],
 ];
 
-/// Name, description and action.
-const TASKS: &[(&str, &str, Action)] = &[
-    ("format", "format the code", Action::Cargo(&[&["fmt", "--all"]])),
+const VERBS: &[Verb] = &[
+    Verb {
+        name: "ci",
+        what: "what CI runs: lint, test and docs with the parts marked *",
+        action: Some(Action::Function(ci)),
+        parts: &[],
+    },
+    Verb {
+        name: "format",
+        what: "format the code",
+        action: Some(Action::Cargo(&[&["fmt", "--all"]])),
+        parts: &[],
+    },
+    Verb {
+        name: "lint",
+        what: "formatting, lints and warnings of the documentation",
+        action: Some(Action::Function(lint)),
+        parts: &[(
+            "deny",
+            "* licences, versions, sources and advisories of the crates that osteon is built from",
+            Action::Function(deny::check),
+        )],
+    },
+    Verb {
+        name: "test",
+        what: "every test of cargo",
+        action: Some(Action::Cargo(&[TEST])),
+        parts: SUITES,
+    },
+    Verb {
+        name: "bench",
+        what: "what docs/performance.md states",
+        action: Some(Action::Cargo(BENCH)),
+        parts: BENCHES,
+    },
+    Verb {
+        name: "docs",
+        what: "* the documentation as a book, and its links",
+        action: Some(Action::Function(book::build)),
+        parts: &[("crates", "the documentation of all crates", Action::Cargo(&[DOCS]))],
+    },
+    Verb {
+        name: "generate",
+        what: "files of the repository that are made from others",
+        action: None,
+        parts: &[
+            (
+                "reference",
+                "what docs/ and python/ take from the program: tables of keys, schemas, types",
+                Action::Function(reference::write),
+            ),
+            (
+                "stubs",
+                "the messages and stubs of the Python package, from the .proto files",
+                Action::Function(python::stubs),
+            ),
+            (
+                "tables",
+                "the tables of docs/validation.md: all, or those of the studies named",
+                Action::Function(tables::rewrite),
+            ),
+        ],
+    },
+    Verb {
+        name: "package",
+        what: "what is published",
+        action: None,
+        parts: &[
+            (
+                "man",
+                "the release with its manual pages and shell completions beside it",
+                Action::Function(manual::write),
+            ),
+            (
+                "wheels",
+                "manylinux wheels: x86_64 and aarch64, or those named",
+                Action::Function(python::wheels),
+            ),
+        ],
+    },
+];
+
+const SUITES: &[Part] = &[
     (
-        "lint",
-        "formatting, lints and warnings of the documentation, as CI wants them",
-        Action::Function(lint),
+        "tracing",
+        "* with the feature otel, and its lints",
+        Action::Cargo(&[TEST_TRACING, LINT_TRACING]),
     ),
-    ("test", "every test", Action::Cargo(&[TEST])),
     (
-        "random",
-        "the tests of properties on new random cases: --minutes M (10) --seed S (the clock's)",
-        Action::Function(random::rounds),
+        "metrics",
+        "* metrics, dashboard and alert rules; promtool if there is one",
+        Action::Function(metrics::check),
     ),
     (
         "python",
-        "builds and tests the Python package, tests the gRPC API by a client; takes names of tests",
+        "* the Python package, and the gRPC API by a client; takes names of tests",
         Action::Function(python::test),
     ),
     (
+        "umbridge",
+        "* `osteon umbridge` by the conformity suite and the clients of UM-Bridge",
+        Action::Function(umbridge::test),
+    ),
+    (
+        "deploy",
+        "* Helm chart, units, Debian package, image; takes names of test files",
+        Action::Function(deploy::check),
+    ),
+    (
+        "slurm",
+        "* the commands for Slurm on a real one on this machine; takes names of tests",
+        Action::Function(slurm::test),
+    ),
+    (
         "pools",
-        "tests workers inside of a real Dask and a real Ray; takes names of tests",
+        "workers inside of a real Dask and a real Ray; takes names of tests",
         Action::Function(python::pools),
     ),
     (
         "notebooks",
-        "executes examples/notebooks with small sizes; takes names of tests",
+        "examples/notebooks with small sizes; takes names of tests",
         Action::Function(python::notebooks),
     ),
     (
-        "stubs",
-        "makes the messages and stubs of the Python package from the .proto files",
-        Action::Function(python::stubs),
-    ),
-    (
-        "wheels",
-        "builds manylinux wheels: x86_64 and aarch64, or those named",
-        Action::Function(python::wheels),
-    ),
-    (
-        "umbridge",
-        "tests `osteon umbridge` by the conformity suite and the clients of UM-Bridge",
-        Action::Function(umbridge::test),
-    ),
-    (
-        "deny",
-        "licences, versions, sources and advisories of the crates that osteon is built from",
-        Action::Function(deny::check),
-    ),
-    (
-        "metrics",
-        "metrics, dashboard and alert rules: their tests, and promtool if there is one",
-        Action::Function(metrics::check),
-    ),
-    (
-        "man",
-        "builds the release and writes its manual pages and shell completions beside it, for packages",
-        Action::Function(manual::write),
-    ),
-    (
-        "deploy",
-        "checks deploy/: Helm chart, units, Debian package, image; takes names of test files",
-        Action::Function(deploy::check),
-    ),
-    (
-        "tracing",
-        "the tests of tracing, on a program with the feature otel, and its lints",
-        Action::Cargo(&[TEST_TRACING, LINT_TRACING]),
-    ),
-    (
-        "ci",
-        "what CI runs: lint, deny, every test, tracing, metrics, book, Python, UM-Bridge, deploy, Slurm \
-         if installed",
-        Action::Commands(&[
-            &["lint"],
-            &["deny"],
-            &["test"],
-            &["tracing"],
-            &["metrics"],
-            &["book"],
-            &["python"],
-            &["umbridge"],
-            &["deploy"],
-            &["slurm", slurm::IF_INSTALLED],
-        ]),
-    ),
-    (
         "report",
-        "looks at reports in Chromium with the network off: rules of axe, script errors, widths",
+        "reports in Chromium with the network off: rules of axe, script errors, widths",
         Action::Function(report::check),
     ),
     (
-        "slurm",
-        "tests the commands for Slurm on a real one on this machine; takes names of tests",
-        Action::Function(slurm::test),
-    ),
-    (
-        "book",
-        "builds the documentation as a book, and checks its links",
-        Action::Function(book::build),
-    ),
-    (
-        "tables",
-        "makes the tables of docs/validation.md again: all, or those of the studies named",
-        Action::Function(tables::rewrite),
-    ),
-    (
-        "reference",
-        "writes what docs/ and python/ take from the program: tables of keys, schemas, types",
-        Action::Function(reference::write),
-    ),
-    (
-        "digests",
-        "compares the digest of a batch over instruction sets and builds; checks AArch64",
-        Action::Function(digests::compare),
+        "random",
+        "properties on new random cases: --minutes M (10) --seed S (the clock's)",
+        Action::Function(random::rounds),
     ),
     (
         "chaos",
         "kills coordinator and workers while jobs run: --kills N (200 each) --seed S (1)",
         Action::Function(chaos::storm),
     ),
-    ("bench", "measures what docs/performance.md states", Action::Cargo(BENCH)),
     (
-        "bench-fleet",
-        "measures jobs on fleets of simulated workers; --help lists the options",
+        "digests",
+        "compares the digest of a batch over instruction sets and builds; checks AArch64",
+        Action::Function(digests::compare),
+    ),
+];
+
+const BENCHES: &[Part] = &[
+    (
+        "fleet",
+        "jobs on fleets of simulated workers; --help lists the options",
         Action::Function(fleet::bench),
     ),
     (
-        "bench-python",
-        "measures what Python adds to the time of velocities: --rounds N (20)",
+        "python",
+        "what Python adds to the time of velocities: --rounds N (20)",
         Action::Function(python::bench),
     ),
     (
-        "bench-peers",
-        "compares the overhead with that of xargs, Dask, Ray and HyperQueue: --rounds N (3)",
+        "peers",
+        "the overhead of xargs, Dask, Ray and HyperQueue beside osteon's: --rounds N (3)",
         Action::Function(peers::bench),
     ),
-    ("docs", "the documentation of all crates", Action::Cargo(&[DOCS])),
+];
+
+/// The commands that CI runs, in this order.
+const CI: &[&[&str]] = &[
+    &["lint"],
+    &["lint", "deny"],
+    &["test"],
+    &["test", "tracing"],
+    &["test", "metrics"],
+    &["docs"],
+    &["test", "python"],
+    &["test", "umbridge"],
+    &["test", "deploy"],
+    &["test", "slurm", slurm::IF_INSTALLED],
 ];
 
 fn main() -> ExitCode {
@@ -226,16 +272,23 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<()> {
-    let arguments: Vec<String> = env::args().skip(1).collect();
-    let (name, words) =
-        arguments.split_first().map_or(("", &[][..]), |(name, words)| (name.as_str(), words));
-    perform(name, words)
+    let words: Vec<String> = env::args().skip(1).collect();
+    perform(&words)
+}
+
+fn ci(words: &[String]) -> Result<()> {
+    if !words.is_empty() {
+        bail!("usage: cargo xtask ci");
+    }
+    CI.iter().try_for_each(|words| {
+        perform(&words.iter().map(|&word| word.to_owned()).collect::<Vec<_>>())
+    })
 }
 
 /// Checks formatting, code and documentation, without running any of it.
 fn lint(words: &[String]) -> Result<()> {
     if !words.is_empty() {
-        bail!("usage: cargo xtask lint");
+        bail!("usage: cargo xtask lint [deny]");
     }
     cargo(&mut cargo_command(FORMAT))?;
     cargo(&mut cargo_command(LINT))?;
@@ -243,23 +296,33 @@ fn lint(words: &[String]) -> Result<()> {
     cargo(cargo_command(DOCS).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Executes the command `name`.
-fn perform(name: &str, words: &[String]) -> Result<()> {
-    let action = TASKS.iter().find(|(task, _, _)| *task == name).map(|(_, _, action)| action);
-    match (action, words) {
-        (Some(Action::Cargo(commands)), []) => {
+/// Runs the command that the words name, or a part of it.
+fn perform(words: &[String]) -> Result<()> {
+    let found = words.split_first().and_then(|(name, rest)| {
+        let verb = VERBS.iter().find(|verb| verb.name == name)?;
+        let part = rest.first().and_then(|word| verb.parts.iter().find(|(name, ..)| name == word));
+        match part {
+            Some((.., action)) => Some((action, &rest[1..])),
+            None => Some((verb.action.as_ref()?, rest)),
+        }
+    });
+    match found {
+        Some((Action::Cargo(commands), [])) => {
             commands.iter().try_for_each(|arguments| cargo(&mut cargo_command(arguments)))
         }
-        (Some(Action::Function(function)), words) => function(words),
-        (Some(Action::Commands(commands)), []) => commands.iter().try_for_each(|command| {
-            let (name, words) = command.split_first().context("a command without a name")?;
-            let words: Vec<String> = words.iter().map(|&word| word.to_owned()).collect();
-            perform(name, &words)
-        }),
+        Some((Action::Function(function), rest)) => function(rest),
         _ => bail!("usage: cargo xtask COMMAND, one of:\n{}", list()),
     }
 }
 
+/// Lists the commands, each above its parts.
 fn list() -> String {
-    TASKS.iter().map(|(name, what, _)| format!("  {name:11} {what}\n")).collect()
+    let mut list = String::new();
+    for Verb { name, what, parts, .. } in VERBS {
+        list += &format!("  {name:20} {what}\n");
+        for (part, what, _) in *parts {
+            list += &format!("  {:20} {what}\n", format!("{name} {part}"));
+        }
+    }
+    list
 }

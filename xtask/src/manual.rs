@@ -15,7 +15,7 @@ const SHELLS: [(&str, &str); 3] =
 /// `completions` beside it.
 pub(crate) fn write(words: &[String]) -> Result<()> {
     if !words.is_empty() {
-        bail!("usage: cargo xtask man");
+        bail!("usage: cargo xtask package man");
     }
     cargo(&mut cargo_command(&["build", "--release", "--bin", "osteon"]))?;
     let release = programs()?.with_file_name("release");

@@ -10,10 +10,10 @@ use anyhow::{Context as _, Result, bail};
 use crate::places::{programs, root};
 use crate::process::{cargo, cargo_command};
 
-/// `cargo xtask metrics`.
+/// `cargo xtask test metrics`.
 pub(crate) fn check(words: &[String]) -> Result<()> {
     if !words.is_empty() {
-        bail!("usage: cargo xtask metrics");
+        bail!("usage: cargo xtask test metrics");
     }
     let directory = programs()?.with_file_name("metrics");
     // The files of an earlier run would be checked if the tests wrote none.

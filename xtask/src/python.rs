@@ -64,7 +64,7 @@ pub(crate) fn wheels(words: &[String]) -> Result<()> {
 /// Makes the messages and stubs that the package ships from the .proto files.
 pub(crate) fn stubs(words: &[String]) -> Result<()> {
     if !words.is_empty() {
-        bail!("usage: cargo xtask stubs");
+        bail!("usage: cargo xtask generate stubs");
     }
     let mut command = python("python/protos.py");
     command.arg("--environment").arg(programs()?.with_file_name("python-package").join("venv"));

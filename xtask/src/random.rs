@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, bail};
 use crate::process::{cargo, cargo_command};
 use crate::terminal::say;
 
-const USAGE: &str = "usage: cargo xtask random [--minutes M] [--seed S]";
+const USAGE: &str = "usage: cargo xtask test random [--minutes M] [--seed S]";
 /// Default duration, minutes.
 const MINUTES: u64 = 10;
 /// Selects all property tests, by the name that `properties!` of `osteon-fuzz` gives them.

@@ -8,7 +8,7 @@ use crate::process::{cargo, cargo_command};
 /// types of the sections in Python, by the tests that compare them.
 pub(crate) fn write(words: &[String]) -> Result<()> {
     if !words.is_empty() {
-        bail!("usage: cargo xtask reference");
+        bail!("usage: cargo xtask generate reference");
     }
     let mut arguments = vec!["test", "--workspace"];
     for test in ["documentation", "result_files", "python_sections", "cli_help", "reference"] {

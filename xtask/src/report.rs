@@ -13,11 +13,11 @@ const BROWSERS: [&str; 2] = ["chromium", "chromium-browser"];
 /// The checks.
 const SCRIPTS: [&str; 2] = ["tests/browser/report.py", "tests/browser/live.py"];
 
-/// `cargo xtask report`: makes reports, and checks them in headless Chromium with the network off; then
+/// `cargo xtask test report`: makes reports, and checks them in headless Chromium with the network off; then
 /// uses the live page of a coordinator.
 pub(crate) fn check(words: &[String]) -> Result<()> {
     if !words.is_empty() {
-        bail!("usage: cargo xtask report");
+        bail!("usage: cargo xtask test report");
     }
     let runs = |name: &&str| {
         Command::new(name).arg("--version").output().is_ok_and(|run| run.status.success())

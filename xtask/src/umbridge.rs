@@ -6,10 +6,10 @@ use crate::places::programs;
 use crate::process::{cargo, cargo_command};
 use crate::python;
 
-/// `cargo xtask umbridge`.
+/// `cargo xtask test umbridge`.
 pub(crate) fn test(words: &[String]) -> Result<()> {
     if !words.is_empty() {
-        bail!("usage: cargo xtask umbridge");
+        bail!("usage: cargo xtask test umbridge");
     }
     cargo(&mut cargo_command(&["build", "--bin", "osteon"]))?;
     let mut command = python::python("tests/umbridge/run.py");

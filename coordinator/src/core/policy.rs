@@ -1,6 +1,6 @@
 //! The constants by which the coordinator decides who computes what, when an answer is late, and which answers are
 //! compared. None of them changes a result: they decide how soon it is there, and how soon a broken machine is
-//! found. `cargo xtask bench-fleet` shows what each is worth.
+//! found. `cargo xtask bench fleet` shows what each is worth.
 
 use std::time::Duration;
 

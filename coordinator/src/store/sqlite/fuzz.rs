@@ -101,7 +101,7 @@ fn run(seeds: Vec<Vec<u8>>, mut check_one: impl FnMut(&mut SqliteStore, &[u8])) 
     });
 }
 
-/// The name by which `cargo xtask random` finds these tests.
+/// The name by which `cargo xtask test random` finds these tests.
 mod on_random_cases {
     use super::*;
 
