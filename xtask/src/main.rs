@@ -46,11 +46,11 @@ struct Verb {
     name: &'static str,
     what: &'static str,
     action: Option<Action>,
-    parts: &'static [Part],
+    parts: &'static [Subcommand],
 }
 
 /// A part of a command: name, description and action.
-type Part = (&'static str, &'static str, Action);
+type Subcommand = (&'static str, &'static str, Action);
 
 const FORMAT: Cargo = &["fmt", "--all", "--check"];
 const LINT: Cargo = &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
@@ -166,7 +166,7 @@ const VERBS: &[Verb] = &[
     },
 ];
 
-const SUITES: &[Part] = &[
+const SUITES: &[Subcommand] = &[
     (
         "tracing",
         "* with the feature otel, and its lints",
@@ -229,7 +229,7 @@ const SUITES: &[Part] = &[
     ),
 ];
 
-const BENCHES: &[Part] = &[
+const BENCHES: &[Subcommand] = &[
     (
         "fleet",
         "jobs on fleets of simulated workers; --help lists the options",
