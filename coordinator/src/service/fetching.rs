@@ -98,7 +98,7 @@ pub(crate) async fn send_all(
             reason: result.reason.clone(),
             json: ResultFile::from_job(left.specification.kind, &result).to_json(),
         };
-        (message, Samples::new(result.best, result.conclusions))
+        (message, SampledSet::new(result.best, result.conclusions))
     })
     .await?;
     reader.send(Part::Result(message)).await?;
@@ -114,7 +114,7 @@ pub(crate) async fn send_all(
             let found = left.group(set, read)?;
             let json = Group::new(left.specification.objective, &found).to_json();
             let message = v1::GroupResult { group: number, json };
-            Some((message, Samples::new(found.best, found.conclusions)))
+            Some((message, SampledSet::new(found.best, found.conclusions)))
         });
         let Some((message, samples)) = found.await? else { continue };
         reader.send(Part::Group(message)).await?;
@@ -141,14 +141,14 @@ async fn computed<T: Send + 'static>(
 }
 
 /// What was sampled for a set of data.
-struct Samples {
+struct SampledSet {
     /// Outcomes at its best point.
     outcomes: Vec<Outcome>,
     /// Draws from its posterior.
     draws: Vec<PosteriorDraw>,
 }
 
-impl Samples {
+impl SampledSet {
     fn new(best: Option<BestPoint>, conclusions: Conclusions) -> Self {
         Self {
             outcomes: best.map(|best| best.outcomes).unwrap_or_default(),
@@ -160,7 +160,7 @@ impl Samples {
 /// Sends the realizations at the best point of a set of data, then the draws from its posterior.
 async fn send_samples(
     group: Option<u32>,
-    samples: &Samples,
+    samples: &SampledSet,
     reader: &FetchStream,
 ) -> Result<(), StreamEnd> {
     for (block, outcomes) in samples.outcomes.chunks(REALIZATION_BLOCK).enumerate() {
@@ -421,7 +421,7 @@ mod tests {
             mean: 3900.0,
             coefficient_of_variation: 0.03,
         };
-        let samples = Samples { outcomes: vec![Ok(3900.0)], draws: vec![draw; DRAW_BLOCK + 1] };
+        let samples = SampledSet { outcomes: vec![Ok(3900.0)], draws: vec![draw; DRAW_BLOCK + 1] };
         let stream =
             paced((), |reader| async move { send_samples(Some(3), &samples, &reader).await });
         let parts: Vec<_> = stream.map(|part| part.unwrap().part.unwrap()).collect().await;
