@@ -82,7 +82,7 @@ impl JobCost {
             places,
             unmeasured,
             limit_s: effort.limit.as_secs_f64(),
-            expected: ExpectedEvaluations::of(specification),
+            expected: ExpectedEvaluations::from_specification(specification),
             realizations: specification.monte_carlo.realizations,
             cores,
         }

@@ -228,7 +228,7 @@ fn scatter_at_start(specification: &JobSpecification, setup: &Setup) -> f64 {
     let bone = Bone { density: start.density(), elasticity };
     let (setup, mut workspace) = (start.setup(setup), Workspace::default());
     let of_quantity = |quantity: SetupQuantity| {
-        let ends = random.scatter(quantity).about(quantity.of(&setup)?);
+        let ends = random.scatter(quantity).about(quantity.value_in(&setup)?);
         let mut velocity = |value| {
             let solver = Solver::new(&quantity.with(value, setup));
             solver.arrival(&bone, &mut workspace).ok().map(|arrival| arrival.velocity)

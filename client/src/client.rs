@@ -84,7 +84,7 @@ impl Client {
         endpoint: &Endpoint,
         credentials: &Credentials,
     ) -> Result<JobsClient<Connection>, ClientError> {
-        let mut patience = Patience::of(answer_limit());
+        let mut patience = Patience::new(answer_limit());
         loop {
             let left = patience.left();
             let attempt = connection::connect_with(endpoint, credentials, left);
@@ -141,7 +141,7 @@ impl Client {
             priority: options.priority,
             name: options.name,
         };
-        let (mut patience, mut uncertain) = (Patience::of(answer_limit()), false);
+        let (mut patience, mut uncertain) = (Patience::new(answer_limit()), false);
         loop {
             let mut call = tonic::Request::new(message.clone());
             let context = span.and_then(|span| span.to_string().parse().ok());
@@ -237,7 +237,7 @@ impl Client {
                     )
                     | ClientError::Unanswered { .. }
             );
-            let search = search.get_or_insert_with(|| Patience::of(answer_limit()));
+            let search = search.get_or_insert_with(|| Patience::new(answer_limit()));
             if !gone || search.left().is_zero() {
                 return Err(error.into());
             }
@@ -254,7 +254,7 @@ impl Client {
         search: &mut Option<Patience>,
     ) -> Result<Result<JobSnapshot, ClientError>, E> {
         let call = self.jobs.watch(v1::WatchRequest { job: job.to_owned(), after: 0 });
-        let limit = || Patience::of(answer_limit());
+        let limit = || Patience::new(answer_limit());
         let answered = match search {
             None => self.peer.answered_within(&mut limit(), call).await,
             Some(search) => self.peer.answered_within(search, call).await,
@@ -303,7 +303,7 @@ impl Client {
         let mut stream = self.peer.answered(call).await?;
         let mut parts = FetchedParts::default();
         loop {
-            let mut patience = Patience::of(answer_limit());
+            let mut patience = Patience::new(answer_limit());
             let Ok(message) = patience.wait_for(stream.message()).await else {
                 return Err(self.peer.silent());
             };

@@ -67,7 +67,7 @@ impl Client {
             Err(error) => return Ok(Err(error)),
         };
         loop {
-            let mut patience = Patience::of(answer_limit());
+            let mut patience = Patience::new(answer_limit());
             let Ok(message) = patience.wait_for(stream.message()).await else {
                 return Ok(Err(self.peer.silent()));
             };
@@ -93,7 +93,7 @@ pub async fn health(
 ) -> Result<bool, ClientError> {
     let Remote { endpoint, files, unused, .. } = remote;
     let files = CredentialFiles { token: None, ..files.clone() };
-    let mut patience = Patience::of(limit);
+    let mut patience = Patience::new(limit);
     let connected = async {
         let credentials = loaded(&files, endpoint).await?;
         let connected = connection::connect_with(endpoint, &credentials, limit);

@@ -42,7 +42,7 @@ impl Peer {
         &mut self,
         call: impl Future<Output = Result<Response<T>, Status>>,
     ) -> Result<T, ClientError> {
-        self.answered_within(&mut Patience::of(answer_limit()), call).await
+        self.answered_within(&mut Patience::new(answer_limit()), call).await
     }
 
     /// Waits for the answer to `call`, for as long as there is patience.
@@ -97,7 +97,7 @@ impl Peer {
             return ClientError::Violations(violations);
         }
         let endpoint = self.endpoint.clone();
-        if let Some(failure) = TlsFailure::of(status) {
+        if let Some(failure) = TlsFailure::find_cause(status) {
             let error = ClientError::from(ConnectError::Tls { endpoint, failure });
             return error.with_unused_variables(&self.unused);
         }
@@ -139,7 +139,7 @@ pub(crate) async fn with_wait_notice<T>(
 ) -> T {
     let mut call = pin!(call);
     let silence = Duration::from_secs(SILENCE_S_MAX);
-    match Patience::of(silence).wait_for(call.as_mut()).await {
+    match Patience::new(silence).wait_for(call.as_mut()).await {
         Ok(answer) => answer,
         Err(_) => {
             listener.note(&notice());

@@ -75,7 +75,7 @@ impl Interval {
     }
 
     /// Returns the values accepted for a parameter, regardless of other fields.
-    pub fn of(parameter: Parameter) -> Self {
+    pub fn accepted_for(parameter: Parameter) -> Self {
         match parameter {
             Parameter::Density
             | Parameter::LongitudinalYoungModulus
@@ -243,7 +243,7 @@ mod tests {
                 "from 1.2e10 to 2.5e10 (the bounds)",
             ),
             (
-                Interval::of(Parameter::Dispersion),
+                Interval::accepted_for(Parameter::Dispersion),
                 [0.1, DISPERSION_MAX.next_down()],
                 [0.0, DISPERSION_MAX],
                 "above 0 and below 0.79772… (that is √(7/11))",
@@ -259,7 +259,7 @@ mod tests {
     fn every_parameter_refuses_what_is_not_finite() {
         for parameter in Parameter::ALL {
             for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-                assert!(!Interval::of(parameter).contains(value), "{}", parameter.name());
+                assert!(!Interval::accepted_for(parameter).contains(value), "{}", parameter.name());
             }
         }
     }

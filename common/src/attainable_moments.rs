@@ -94,7 +94,7 @@ fn scatter_of_velocity(
     random: &RandomQuantities,
 ) -> f64 {
     let of_quantity = |quantity: SetupQuantity| {
-        let mean = quantity.of(setup)?;
+        let mean = quantity.value_in(setup)?;
         let [low, high] = random.scatter(quantity).about(mean);
         let at = |value| velocities(ranges, &quantity.with(value, *setup));
         let (below, above) = (at(low), at(high));

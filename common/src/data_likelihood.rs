@@ -94,7 +94,7 @@ impl DataLikelihood {
         subjects: &[u32],
         (repeatability, has_subjects): (f64, bool),
     ) -> Option<Self> {
-        let scale = RobustScale::of(velocities);
+        let scale = RobustScale::from_velocities(velocities);
         let is_right = |velocity: &f64| scale.is_none_or(|scale| !scale.is_far(*velocity));
         let right: Vec<f64> = velocities.iter().copied().filter(is_right).collect();
         let first = right.first().copied()?;

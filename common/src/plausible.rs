@@ -183,7 +183,7 @@ const DISPERSION: PlausibleRange = PlausibleRange {
 
 impl PlausibleRange {
     /// Returns the prior knowledge about a parameter.
-    pub fn of(parameter: Parameter) -> Self {
+    pub fn known_of(parameter: Parameter) -> Self {
         match parameter {
             Parameter::Density => DENSITY,
             Parameter::LongitudinalYoungModulus

@@ -123,7 +123,7 @@ impl RandomQuantities {
 
     /// Returns the setup of one realization: `setup` with the values for these germs.
     pub(crate) fn draw(&self, setup: &Setup, germs: &[f64; SETUP_GERMS]) -> Setup {
-        let drawn = |setup: Setup, quantity: SetupQuantity| match quantity.of(&setup) {
+        let drawn = |setup: Setup, quantity: SetupQuantity| match quantity.value_in(&setup) {
             Some(mean) => {
                 let value = self.scatter(quantity).value(mean, germs[quantity as usize]);
                 quantity.with(value, setup)
@@ -199,7 +199,8 @@ mod tests {
     fn values(quantity: SetupQuantity, random: &RandomQuantities, setup: &Setup) -> Vec<f64> {
         let scheme = GermScheme::Sobol { points: 1 << 14 };
         let maker = GermMaker::new(GermSource { seed: 3, scheme });
-        let value = |index| quantity.of(&random.draw(setup, &maker.setup_germs(index))).unwrap();
+        let value =
+            |index| quantity.value_in(&random.draw(setup, &maker.setup_germs(index))).unwrap();
         (0..1 << 14).map(value).collect()
     }
 

@@ -32,7 +32,7 @@ pub struct RobustScale {
 
 impl RobustScale {
     /// Returns those of velocities (m/s); `None` for fewer than five, and if both scales are 0.
-    pub fn of(velocities: &[f64]) -> Option<Self> {
+    pub fn from_velocities(velocities: &[f64]) -> Option<Self> {
         if velocities.len() < COUNT_MIN {
             return None;
         }
@@ -65,7 +65,7 @@ impl RobustScale {
 /// Returns the velocities (m/s) that are farther from the median than 6 robust standard deviations,
 /// and than 6 + 300/n² for n of them; none for fewer than five.
 pub fn outliers(velocities: &[f64]) -> Vec<Outlier> {
-    let Some(scale) = RobustScale::of(velocities) else { return Vec::new() };
+    let Some(scale) = RobustScale::from_velocities(velocities) else { return Vec::new() };
     let far = velocities.iter().enumerate().filter(|(_, velocity)| scale.is_far(**velocity));
     far.map(|(index, &velocity)| Outlier {
         index: index as u64,
@@ -106,10 +106,10 @@ mod tests {
     fn equal_velocities_have_the_scale_of_their_quartiles_or_none() {
         let mut velocities = vec![3900.0; 7];
         velocities.extend([3890.0, 3880.0, 3870.0, 3860.0, 7800.0]);
-        assert_eq!(RobustScale::of(&velocities).unwrap().deviation, 12.5 / 1.349);
+        assert_eq!(RobustScale::from_velocities(&velocities).unwrap().deviation, 12.5 / 1.349);
         assert_eq!(found(&velocities), [11]);
         velocities[7..11].fill(3900.0);
-        assert_eq!(RobustScale::of(&velocities), None);
+        assert_eq!(RobustScale::from_velocities(&velocities), None);
         assert_eq!(found(&velocities), [0; 0]);
     }
 

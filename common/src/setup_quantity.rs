@@ -54,7 +54,7 @@ impl SetupQuantity {
     }
 
     /// Returns the value in a setup; `None` if the setup has none.
-    pub fn of(self, setup: &Setup) -> Option<f64> {
+    pub fn value_in(self, setup: &Setup) -> Option<f64> {
         match self {
             Self::BoneThickness => Some(setup.layers.bone_thickness),
             Self::BoneQualityFactor => setup.layers.bone_attenuation.quality_factor,

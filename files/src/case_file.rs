@@ -150,7 +150,7 @@ fn required(
     base: Base,
     typed: bool,
 ) -> Option<f64> {
-    let (key, accepted) = (parameter.name(), Interval::of(parameter));
+    let (key, accepted) = (parameter.name(), Interval::accepted_for(parameter));
     if !table.has(key) {
         let value = base.value(parameter);
         if value.is_none() {
@@ -163,7 +163,7 @@ fn required(
     let value = reader.number(table, key)?;
     let path = table.path(key);
     if typed {
-        let kind = PlausibleRange::of(parameter);
+        let kind = PlausibleRange::known_of(parameter);
         check::quantity(&path, value, accepted, &kind, &mut reader.violations);
     } else {
         check::number(&path, value, accepted, &mut reader.violations);

@@ -117,7 +117,7 @@ async fn channel(
             }
         }
     };
-    match Patience::of(timeout).wait_for(attempt).await {
+    match Patience::new(timeout).wait_for(attempt).await {
         Ok(Ok(channel)) => Ok(channel),
         Ok(Err(error)) => Err(unconnected(endpoint, &error)),
         Err(_) => Err(ConnectError::Timeout {
@@ -143,7 +143,7 @@ async fn dial_tls(
 
 fn unconnected(endpoint: &Endpoint, error: &(dyn std::error::Error + 'static)) -> ConnectError {
     let endpoint = endpoint.clone();
-    match TlsFailure::of(error) {
+    match TlsFailure::find_cause(error) {
         Some(failure) => ConnectError::Tls { endpoint, failure },
         None => ConnectError::Unreachable { endpoint, reason: innermost(error) },
     }

@@ -30,7 +30,7 @@ pub struct Exhausted;
 
 impl Patience {
     /// Begins with a limit.
-    pub fn of(limit: Duration) -> Self {
+    pub fn new(limit: Duration) -> Self {
         Self { left: limit, prolonged: false }
     }
 
@@ -84,7 +84,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_limit_is_kept_over_several_waits() {
         let begun = Instant::now();
-        let mut patience = Patience::of(Duration::from_secs(10));
+        let mut patience = Patience::new(Duration::from_secs(10));
         assert_eq!(patience.wait_for(async { 7 }).await, Ok(7));
         patience.rest(Duration::from_millis(3100)).await;
         assert_eq!(patience.left(), Duration::from_millis(6900));
@@ -107,7 +107,7 @@ mod tests {
                 sleep(Duration::from_millis(100)).await;
                 sender.send(7)
             });
-            let mut patience = Patience::of(limit);
+            let mut patience = Patience::new(limit);
             assert_eq!(patience.wait_for(answer).await, Ok(Ok(7)), "{limit:?}");
             peer.await.unwrap().unwrap();
         }
@@ -116,7 +116,7 @@ mod tests {
     /// A machine that is paused again and again does not make a wait endless.
     #[test]
     fn pauses_prolong_once() {
-        let mut patience = Patience::of(Duration::from_secs(1));
+        let mut patience = Patience::new(Duration::from_secs(1));
         let mut slices = 0;
         while !patience.left().is_zero() {
             patience.take(Duration::from_secs(60));

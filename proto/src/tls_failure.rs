@@ -40,7 +40,7 @@ pub enum TlsFailure {
 
 impl TlsFailure {
     /// Returns the TLS failure that caused an error, if there is one.
-    pub fn of(error: &(dyn Error + 'static)) -> Option<Self> {
+    pub fn find_cause(error: &(dyn Error + 'static)) -> Option<Self> {
         let mut cause = Some(error);
         while let Some(error) = cause {
             if let Some(tls) = error.downcast_ref::<rustls::Error>() {
@@ -95,7 +95,7 @@ mod tests {
         let check = |error: rustls::Error, expected: &str| {
             let hidden = io::Error::new(io::ErrorKind::InvalidData, error);
             let outer = io::Error::other(tonic::Status::from_error(Box::new(hidden)));
-            let failure = TlsFailure::of(&outer).map(|failure| failure.to_string());
+            let failure = TlsFailure::find_cause(&outer).map(|failure| failure.to_string());
             assert!(failure.as_ref().is_some_and(|text| text.contains(expected)), "{failure:?}");
         };
         let certificate = rustls::Error::InvalidCertificate;
@@ -108,6 +108,6 @@ mod tests {
         check(rustls::Error::AlertReceived(alert), "TLS failed");
         let no_tls = rustls::InvalidMessage::InvalidContentType;
         check(rustls::Error::InvalidMessage(no_tls), "http://");
-        assert_eq!(TlsFailure::of(&io::Error::other("reset")), None);
+        assert_eq!(TlsFailure::find_cause(&io::Error::other("reset")), None);
     }
 }

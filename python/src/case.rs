@@ -117,7 +117,7 @@ pub(crate) fn density_of(density: f64, field: &str) -> PyResult<f64> {
 #[pyfunction]
 pub(crate) fn arrival<'py>(py: Python<'py>, case: &PyCase) -> PyResult<PlainArrival<'py>> {
     let case = &case.case;
-    let solver = solvers::of(py, &case.setup)?;
+    let solver = solvers::kept_solver(py, &case.setup)?;
     let found = errors::computed(py, || solver.arrival(&case.bone, &mut Workspace::default()))?;
     let found = found.map_err(|failure| errors::of_failure(&failure))?;
     let array = |values| PyArray1::from_vec(py, values);
@@ -134,7 +134,7 @@ pub(crate) fn traces<'py>(
     time_step: f64,
 ) -> PyResult<PlainTraces<'py>> {
     let case = &case.case;
-    let solver = solvers::of(py, &case.setup)?;
+    let solver = solvers::kept_solver(py, &case.setup)?;
     let found = errors::computed(py, || solver.traces(&case.bone, duration, time_step))?;
     // The messages name the options of the command line.
     let named =

@@ -21,7 +21,7 @@ static KEPT: Mutex<(u32, VecDeque<Arc<Solver>>)> = Mutex::new((0, VecDeque::new(
 ///
 /// The lock is held only while the interpreter is, so that a process that Python forks never finds it
 /// locked. Solvers of the parent may have locked tables, and are left alone.
-pub(crate) fn of(_interpreter: Python<'_>, setup: &Setup) -> PyResult<Arc<Solver>> {
+pub(crate) fn kept_solver(_interpreter: Python<'_>, setup: &Setup) -> PyResult<Arc<Solver>> {
     let isa = Isa::chosen(env::var_os(Isa::VARIABLE))
         .map_err(|error| errors::bad_input("", error.to_string()))?;
     // A panic while the lock is held leaves no half-finished entry.

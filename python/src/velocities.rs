@@ -27,7 +27,7 @@ pub(crate) fn velocities_of_tensors<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PlainVelocities<'py>> {
-    let solver = solvers::of(py, &case.case.setup)?;
+    let solver = solvers::kept_solver(py, &case.case.setup)?;
     let bones = bones(&tensors, &densities)?;
     let plan = ParallelMap { threads, progress };
     let outcomes = plan.map(py, bones.len(), |index, memory: &mut Workspace| {
@@ -49,7 +49,7 @@ pub(crate) fn velocities_of_cases<'py>(
     let mut outcomes: Vec<Outcome> = Vec::with_capacity(cases.len());
     for group in cases.chunk_by(|one, next| one.setup == next.setup) {
         let setup: &Setup = &group[0].setup;
-        let solver: Arc<Solver> = solvers::of(py, setup)?;
+        let solver: Arc<Solver> = solvers::kept_solver(py, setup)?;
         let before = outcomes.len();
         let progress = match &progress {
             Some(progress) => Some(offset(py, progress, before)?),

@@ -147,7 +147,7 @@ pub(crate) enum Ink {
 
 impl Ink {
     /// The colour of the `n`-th of several, from 0; they repeat after four.
-    pub(crate) fn of(n: usize) -> Self {
+    pub(crate) fn nth(n: usize) -> Self {
         [Self::First, Self::Second, Self::Third, Self::Fourth][n % 4]
     }
 }

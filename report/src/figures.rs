@@ -38,18 +38,18 @@ pub(crate) fn of_finding(finding: &Finding<'_>) -> Vec<FigureSection> {
         let heading = format!("{heading}{suffix}");
         FigureSection { heading, figures }
     };
-    let mut velocities = velocities::of(finding);
-    velocities.extend(sequence::of(finding));
+    let mut velocities = velocities::figures(finding);
+    velocities.extend(sequence::figures(finding));
     vec![
         section("Velocities", velocities),
-        section("Moments against their number", moments::of(finding)),
-        section("Convergence of the search", convergence::of(finding)),
+        section("Moments against their number", moments::figures(finding)),
+        section("Convergence of the search", convergence::figures(finding)),
         section("What the data say of each parameter", {
-            let mut figures = profiles::of(finding);
-            figures.extend(posterior::of(finding));
+            let mut figures = profiles::figures(finding);
+            figures.extend(posterior::figures(finding));
             figures
         }),
-        section("Several starts", solutions::of(finding)),
-        section("Failed realizations", failures::of(finding)),
+        section("Several starts", solutions::figures(finding)),
+        section("Failed realizations", failures::figures(finding)),
     ]
 }

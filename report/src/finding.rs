@@ -245,5 +245,5 @@ fn measured(context: &JobContext, set: usize) -> Option<VelocitySample> {
 }
 
 fn model(context: &JobContext, group: Option<&str>) -> ModelOutcomes {
-    context.realizations.as_ref().map(|all| all.of(group)).unwrap_or_default()
+    context.realizations.as_ref().map(|all| all.outcomes_of_group(group)).unwrap_or_default()
 }

@@ -98,7 +98,7 @@ impl RealizationRows {
     }
 
     /// Returns the realizations of a group, or all of a run without groups.
-    pub(crate) fn of(&self, group: Option<&str>) -> ModelOutcomes {
+    pub(crate) fn outcomes_of_group(&self, group: Option<&str>) -> ModelOutcomes {
         let of_group = |place: &usize| {
             group.is_none_or(|name| self.groups.get(*place).is_some_and(|one| one == name))
         };

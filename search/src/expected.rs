@@ -24,7 +24,7 @@ pub struct ExpectedEvaluations {
 
 impl ExpectedEvaluations {
     /// Returns the range for a job that has been checked.
-    pub fn of(specification: &JobSpecification) -> Self {
+    pub fn from_specification(specification: &JobSpecification) -> Self {
         if specification.kind == JobKind::Propagation {
             return Self { fewest: 1, most: 1 };
         }
@@ -93,7 +93,8 @@ mod tests {
     }
 
     fn range(specification: &JobSpecification) -> (u64, u64) {
-        let ExpectedEvaluations { fewest, most } = ExpectedEvaluations::of(specification);
+        let ExpectedEvaluations { fewest, most } =
+            ExpectedEvaluations::from_specification(specification);
         assert!(most <= specification.evaluations_max());
         (fewest, most)
     }

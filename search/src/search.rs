@@ -382,7 +382,7 @@ impl Summary {
         // Moments that the search could not match are not fitted.
         let fitted = match (objective, agreement) {
             (Objective::Likelihood, _) | (_, Some(Agreement { matched: true, .. })) => {
-                FittedMoments::of(specification)
+                FittedMoments::from_specification(specification)
             }
             _ => FittedMoments::Neither,
         };

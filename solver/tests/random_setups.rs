@@ -69,7 +69,7 @@ fn check(quantity: SetupQuantity, setup: &Setup, deviation: f64, tolerance: f64)
         SetupQuantity::CouplingSoundSpeed => random.coupling_sound_speed = scatter,
         SetupQuantity::ProbeTilt => random.probe_tilt = scatter,
     }
-    let mean = quantity.of(setup).unwrap();
+    let mean = quantity.value_in(setup).unwrap();
     let expected = by_quadrature(|node| quantity.with(mean + node * deviation, *setup));
     let found = by_realizations(setup, random);
     let off = found.mean / expected.mean - 1.0;

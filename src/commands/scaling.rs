@@ -22,7 +22,7 @@ use super::slurm::check_workers;
 /// Looks and acts until it is interrupted, or once with `--dry-run`.
 pub(super) async fn follow(plan: ScalingPlan) -> Result<ExitStatus, CommandFailure> {
     check_workers(&plan.script)?;
-    let names = Names::of(&plan.coordinator);
+    let names = Names::for_coordinator(&plan.coordinator);
     let (mut scaling, begun) = (Scaling::default(), Instant::now());
     let mut told = String::new();
     let mut first = true;
@@ -70,7 +70,7 @@ struct Names {
 }
 
 impl Names {
-    fn of(coordinator: &Remote) -> Self {
+    fn for_coordinator(coordinator: &Remote) -> Self {
         let hash = blake3::hash(coordinator.endpoint.to_string().as_bytes()).to_hex();
         let elastic = format!("osteon-worker-{}", &hash[..8]);
         Self { lasting: format!("{elastic}{LASTING}"), elastic }

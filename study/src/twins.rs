@@ -87,7 +87,7 @@ pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, 
         let found = found(&specification, &mut RealizationCache::new(), twins.isa)?;
         let mut row = vec![(set + 1).to_string(), searched.name().replace('_', " ")];
         for parameter in [searched, Parameter::Dispersion] {
-            let quantity = found.as_ref().and_then(|found| of(found, parameter));
+            let quantity = found.as_ref().and_then(|found| quantity_of(found, parameter));
             let (truth, quantity) = (truth.get(parameter), quantity);
             row.push(format!("{truth:.5e}"));
             row.push(quantity.map_or("–".to_owned(), |found| format!("{:.5e}", found.value)));
@@ -106,7 +106,7 @@ pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, 
 /// If a point has no ensemble.
 pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let usual = Surroundings::default();
-    let counts = Counts::of(twins, &usual, &usual, progress)?;
+    let counts = Counts::over_data_sets(twins, &usual, &usual, progress)?;
     let mut table = MarkdownTable::new(&COUNTED_COLUMNS);
     counts.rows().into_iter().for_each(|row| table.push(row));
     Ok(table)
@@ -124,7 +124,7 @@ pub fn populations(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownT
     let population = population();
     let means = Surroundings { random: RandomQuantities::default(), ..population };
     for (model, name) in [(&population, "those of the data"), (&means, "none")] {
-        let counts = Counts::of(twins, &population, model, progress)?;
+        let counts = Counts::over_data_sets(twins, &population, model, progress)?;
         for row in counts.rows() {
             table.push([vec![name.to_owned()], row].concat());
         }
@@ -163,7 +163,7 @@ struct Counts {
 
 impl Counts {
     /// Counts over data sets that are made in some surroundings, and identified by a model in others.
-    fn of(
+    fn over_data_sets(
         twins: &Twins,
         data: &Surroundings,
         model: &Surroundings,
@@ -334,7 +334,7 @@ fn found(
     Ok(identify(specification, known, isa)?.result.conclusions.inference)
 }
 
-fn of(found: &Inference, parameter: Parameter) -> Option<DerivedQuantity> {
+fn quantity_of(found: &Inference, parameter: Parameter) -> Option<DerivedQuantity> {
     match parameter {
         Parameter::Dispersion => Some(found.dispersion),
         _ => found.parameters.iter().find(|(name, _)| *name == parameter).map(|(_, found)| *found),

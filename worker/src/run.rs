@@ -338,7 +338,7 @@ impl Worker {
     fn ended_with(&mut self, status: &Status) -> Result<End, WorkerError> {
         // Only errors of the transport have a source, so one without was sent by a coordinator.
         self.ever_answered |= std::error::Error::source(status).is_none();
-        if let Some(failure) = TlsFailure::of(status) {
+        if let Some(failure) = TlsFailure::find_cause(status) {
             return self.on_tls_failure(failure);
         }
         let reason = self.endpoint.explained(status, self.ever_answered);

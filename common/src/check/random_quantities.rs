@@ -39,7 +39,7 @@ fn extent(
 ) {
     let (table, mean_key) = (format!("random.{}", quantity.name()), quantity.mean_key());
     let scatter = random.scatter(quantity);
-    let Some(mean) = quantity.of(setup) else {
+    let Some(mean) = quantity.value_in(setup) else {
         let message = format!("scatters about {mean_key}, which is not given; give both");
         return violations.add(table, message);
     };

@@ -111,7 +111,7 @@ impl Contamination {
         };
         let normal = Ratio::new(mean, variance);
         let probability = |one: &FarVelocity| {
-            let ratio = normal.of(one);
+            let ratio = normal.at(one);
             average(&|rate| rate / ((1.0 - rate) * ratio + rate))
         };
         OutlierShare {
@@ -124,7 +124,7 @@ impl Contamination {
     fn logs(&self, mean: f64, variance: f64) -> Vec<f64> {
         let normal = Ratio::new(mean, variance);
         let ratios: Vec<(f64, f64)> =
-            self.far.iter().map(|one| (normal.of(one), one.count)).collect();
+            self.far.iter().map(|one| (normal.at(one), one.count)).collect();
         let of = |&(rate, log_weight): &(f64, f64)| {
             let mixture = |ratio: f64| (1.0 - rate).mul_add(ratio, rate);
             let mut log = log_weight;
@@ -170,7 +170,7 @@ impl Ratio {
         Self { mean, variance, height: 1.0 / (2.0 * PI * variance).sqrt() }
     }
 
-    fn of(&self, velocity: &FarVelocity) -> f64 {
+    fn at(&self, velocity: &FarVelocity) -> f64 {
         let off = velocity.offset - self.mean;
         self.height * libm::exp(-0.5 * off * off / self.variance) / velocity.broad
     }

@@ -296,7 +296,7 @@ fn the_mixture_is_that_of_all_velocities() {
     let mut velocities = normal(9, 60);
     velocities.extend([4600.0, 4600.1, 5200.0]);
     let likelihood = DataLikelihood::independent(&velocities, 20.0).unwrap();
-    let scale = RobustScale::of(&velocities).unwrap();
+    let scale = RobustScale::from_velocities(&velocities).unwrap();
     let direct = |mean: f64, sigma: f64| {
         let variance = sigma * sigma + 400.0;
         let of = |rate: f64| -> f64 {

@@ -42,7 +42,7 @@ pub enum FittedMoments {
 impl FittedMoments {
     /// Returns which moments the free parameters of a job can move: the dispersion the coefficient of
     /// variation, all others the mean.
-    pub fn of(specification: &JobSpecification) -> Self {
+    pub fn from_specification(specification: &JobSpecification) -> Self {
         let is_free =
             |parameter: &Parameter| matches!(specification.range(*parameter), Range::Free { .. });
         let dispersion = is_free(&Parameter::Dispersion);

@@ -181,7 +181,7 @@ fn is_workers(certificate: &CertificateDer<'_>) -> bool {
 }
 
 fn fault(error: &rustls::Error) -> Fault {
-    match TlsFailure::of(error) {
+    match TlsFailure::find_cause(error) {
         Some(TlsFailure::UnknownAuthority) => Fault::UnknownAuthority,
         Some(TlsFailure::Expired) => Fault::Expired,
         Some(TlsFailure::NotYetValid) => Fault::NotYetValid,

@@ -70,7 +70,7 @@ impl Outbound {
         evaluations: &mut EvaluationMessages,
     ) -> Result<(), NotReading> {
         if self.announced.get(work.evaluation.id).is_none() {
-            self.send(Ok(evaluations.of(&work.evaluation)))?;
+            self.send(Ok(evaluations.announcement(&work.evaluation)))?;
             self.announced.announce(work.evaluation.id, ());
         }
         self.send(Ok(batch(id, work, trace)))
@@ -84,7 +84,7 @@ pub(crate) struct EvaluationMessages(Announced<AttachResponse>);
 
 impl EvaluationMessages {
     /// Returns the message that announces an evaluation.
-    fn of(&mut self, input: &EvaluationInput) -> AttachResponse {
+    fn announcement(&mut self, input: &EvaluationInput) -> AttachResponse {
         if let Some(made) = self.0.get(input.id) {
             return *made;
         }

@@ -96,7 +96,8 @@ impl SqliteStore {
             never_again(&connection, last).map_err(|source| opening::refusal(&path, source))?;
         }
         let mark = RefCell::new(Mark::open(directory, &found, last)?);
-        let log = Log::of(&mut connection).map_err(|source| opening::refusal(&path, source))?;
+        let log =
+            Log::take_over(&mut connection).map_err(|source| opening::refusal(&path, source))?;
         Ok(Self {
             connection,
             path,

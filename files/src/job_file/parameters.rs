@@ -40,7 +40,7 @@ pub(super) fn read(reader: &mut Reader, root: &Table<'_>, setup: &Setup) -> [Ran
     }
     let base = Base::read(reader, &table);
     Parameter::ALL.map(|parameter| match parameter.of_setup() {
-        Some(quantity) => searched(reader, &table, parameter, quantity.of(setup)),
+        Some(quantity) => searched(reader, &table, parameter, quantity.value_in(setup)),
         None => range(reader, &table, parameter, base),
     })
 }

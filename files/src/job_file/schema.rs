@@ -183,7 +183,7 @@ fn ranges() -> Json {
 }
 
 fn range(parameter: Parameter) -> Json {
-    let value = || number(None, Interval::of(parameter));
+    let value = || number(None, Interval::accepted_for(parameter));
     let bounds = json!({ "type": "array", "items": value(), "minItems": 2, "maxItems": 2 });
     let [start, bounds, fixed] = {
         let [start_key, bounds_key, fixed_key] = parameters::KEYS;
@@ -210,7 +210,7 @@ fn range(parameter: Parameter) -> Json {
 fn prior(parameter: Parameter) -> Json {
     let [value, weight] = priors::KEYS;
     let properties = json!({
-        value.name: described(number(None, Interval::of(parameter)), value),
+        value.name: described(number(None, Interval::accepted_for(parameter)), value),
         weight.name: described(number(None, Interval::above(0.0, "")), weight),
     });
     let mut prior = object(properties);

@@ -33,7 +33,7 @@ pub(crate) fn overlay(runs: &[(String, &VelocitySample)]) -> Vec<Figure> {
     let lowest = lowest.fold(f64::INFINITY, f64::min);
     let mut highest = 0.0_f64;
     for (place, (name, sample)) in shown.iter().enumerate() {
-        let ink = Ink::of(place);
+        let ink = Ink::nth(place);
         distributions.layer(name.clone(), ink, Shape::Line(sample.distribution()));
         let density = sample.density();
         highest = density.iter().map(|[_, height]| *height).fold(highest, f64::max);

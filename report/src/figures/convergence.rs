@@ -13,7 +13,7 @@ use crate::quantity::{symbol, words};
 const ROWS_MAX: usize = 600;
 
 /// Returns the figures of the search, if its history is known.
-pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
+pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     SearchCourse::of_finding(finding).map(|course| of_course(&course)).unwrap_or_default()
 }
 
@@ -136,9 +136,9 @@ fn parameters(course: &SearchCourse) -> Option<Figure> {
         {
             // Colours repeat after four.
             let at = [end[0] * 0.985, end[1]];
-            chart.layer("", Ink::of(place), Shape::Texts(vec![(at, symbol(*parameter).into())]));
+            chart.layer("", Ink::nth(place), Shape::Texts(vec![(at, symbol(*parameter).into())]));
         }
-        chart.layer(symbol(*parameter), Ink::of(place), Shape::Line(line));
+        chart.layer(symbol(*parameter), Ink::nth(place), Shape::Line(line));
     }
     let reading = "Each line is one free parameter. One that still moves while the cost is level is \
                    not determined by the data; one that ends at 0 or 1 is held by its bound, which \

@@ -13,7 +13,7 @@ use crate::quantity;
 const PLACES: usize = 50;
 
 /// Returns the figures, if any realization failed.
-pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
+pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     if finding.failed() == 0 {
         return Vec::new();
     }
@@ -97,7 +97,7 @@ fn along_indices(finding: &Finding<'_>) -> Option<Figure> {
             .enumerate()
             .map(|(place, count)| [place as f64 * width, (place as f64 + 1.0) * width, count]);
         let shown = quantity::failure(kind);
-        chart.layer(shown, Ink::of(place + 1), Shape::Bars(bars.collect()));
+        chart.layer(shown, Ink::nth(place + 1), Shape::Bars(bars.collect()));
     }
     let reading = "Failures of independent realizations are spread evenly over the indices. Where they \
                    pile up at some place, look at those realizations with osteon draw.";

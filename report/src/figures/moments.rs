@@ -14,7 +14,7 @@ const STEPS: u32 = 90;
 const FEWEST: f64 = 5.0;
 
 /// Returns a figure for each moment.
-pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
+pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let Some(sample) = &finding.model.velocities else { return Vec::new() };
     let running: Vec<Running> =
         sample.running(STEPS).into_iter().filter(|one| one.count >= FEWEST).collect();

@@ -9,7 +9,7 @@ use crate::quantity::{symbol, unit, words};
 use crate::sample::VelocitySample;
 
 /// Returns a figure for each free parameter.
-pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
+pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let Some(posterior) = finding.posterior else { return Vec::new() };
     let parameters = posterior.parameters.keys();
     parameters.filter_map(|parameter| figure(finding, *parameter)).collect()

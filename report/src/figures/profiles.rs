@@ -6,7 +6,7 @@ use crate::finding::Finding;
 use crate::quantity::{symbol, unit, words};
 
 /// Returns a figure for each profile.
-pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
+pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let profiles = finding.profiles.into_iter().flatten();
     let figure = |(parameter, profile): (&_, &osteon_files::report::ParameterProfile)| {
         let parameter = *parameter;

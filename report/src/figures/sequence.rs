@@ -11,7 +11,7 @@ const DOTS_MAX: usize = 3000;
 const BLOCKS: usize = 200;
 
 /// Returns a figure of the measured velocities, and one of the model's.
-pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
+pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let measured = finding
         .measured
         .as_ref()

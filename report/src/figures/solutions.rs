@@ -9,7 +9,7 @@ use crate::quantity::{symbol, words};
 const DRAWN_MAX: usize = 60;
 
 /// Returns the figure, if there were several starts.
-pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
+pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let (Some(solutions), free) = (finding.solutions, finding.free()) else { return Vec::new() };
     if free.len() < 2 || solutions.points.is_empty() {
         return Vec::new();

@@ -11,7 +11,7 @@ const MEASURED: &str = "measured";
 const AXIS: &str = "velocity (m/s)";
 
 /// Returns the figures of the velocities.
-pub(super) fn of(finding: &Finding<'_>) -> Vec<Figure> {
+pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let samples = ComparedSamples {
         model: finding.model.velocities.as_ref(),
         measured: finding.measured.as_ref(),

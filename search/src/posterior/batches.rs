@@ -87,7 +87,7 @@ impl PosteriorSearch {
         let settings = specification.posterior.unwrap_or_default();
         let problem =
             likelihood.and_then(|likelihood| PosteriorProblem::new(specification, likelihood));
-        let scale = problem.as_ref().map_or_else(|| Scale::of(&[]), |one| one.scale);
+        let scale = problem.as_ref().map_or_else(|| Scale::from_sample(&[]), |one| one.scale);
         let mut search = Self {
             problem,
             max_evaluations: settings.max_evaluations,

@@ -97,7 +97,7 @@ impl PosteriorProblem {
         let reach = [reach(0, |one| 0.5 * one[5]), reach(1, |one| one[6])];
         let grid = MomentsGrid::new(&likelihood, reach);
         let pivots = Pivots::choose(&priors, points.first().unwrap_or(&base));
-        let scale = Scale::of(&sample);
+        let scale = Scale::from_sample(&sample);
         Some(Self { likelihood, priors, scale, base, pivots, reach, grid, seed })
     }
 

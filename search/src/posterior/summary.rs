@@ -147,7 +147,7 @@ pub(super) fn predictive_p_value(
     }
     let coefficient_of_variation = found.coefficient_of_variation.mean;
     let at = Moments { mean: found.mean.mean, coefficient_of_variation };
-    let fitted = FittedMoments::of(specification);
+    let fitted = FittedMoments::from_specification(specification);
     let sampling = specification.monte_carlo.sampling;
     let test = predictive_test(data.velocities, &best.outcomes, sampling, fitted, at)?;
     Some(test.p_value)

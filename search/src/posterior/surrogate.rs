@@ -67,7 +67,7 @@ struct Process {
 
 impl Scale {
     /// Returns the scale of a sample of features.
-    pub(super) fn of(sample: &[Features]) -> Self {
+    pub(super) fn from_sample(sample: &[Features]) -> Self {
         let count = sample.len().max(1) as f64;
         let mut scale = Self { centre: [0.0; FEATURES], spread: [f64::INFINITY; FEATURES] };
         for k in 0..FEATURES {
@@ -252,7 +252,7 @@ mod tests {
     #[test]
     fn smooth_functions_are_interpolated() {
         let inputs = sample(80, 3);
-        let mut surrogate = Surrogate::new(Scale::of(&inputs));
+        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs));
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);
         for x in sample(50, 4) {
@@ -266,7 +266,7 @@ mod tests {
     #[test]
     fn expected_errors_are_those_found() {
         let inputs = sample(60, 3);
-        let mut surrogate = Surrogate::new(Scale::of(&inputs));
+        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs));
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);
         let mut sums = [[0.0; 2]; 2];
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn points_are_interpolated() {
         let inputs = sample(30, 5);
-        let mut surrogate = Surrogate::new(Scale::of(&inputs));
+        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs));
         assert_eq!(surrogate.mean(&inputs[0]), RULE_OF_THUMB);
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);

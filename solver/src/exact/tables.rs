@@ -146,7 +146,7 @@ impl Tables {
             .collect();
         Self {
             setup: *setup,
-            heights: Heights::of(setup),
+            heights: Heights::from_setup(setup),
             sampling,
             runs,
             lines,
@@ -257,7 +257,7 @@ impl Tables {
 }
 
 impl Heights {
-    fn of(setup: &Setup) -> Self {
+    fn from_setup(setup: &Setup) -> Self {
         let probe = &setup.probe;
         let heights: Vec<f64> = probe.places().map(|place| place.x3).collect();
         Self {

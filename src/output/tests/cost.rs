@@ -20,7 +20,7 @@ fn cost(specification: &JobSpecification, start_ms: Option<f64>, box_ms: &[f64])
         places: box_ms.iter().copied().map(place).collect(),
         unmeasured: 3 - box_ms.len(),
         limit_s: 2.0,
-        expected: ExpectedEvaluations::of(specification),
+        expected: ExpectedEvaluations::from_specification(specification),
         realizations: specification.monte_carlo.realizations,
         cores: 2,
     }

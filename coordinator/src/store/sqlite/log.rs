@@ -32,7 +32,7 @@ pub(super) struct Log {
 
 impl Log {
     /// Takes over the copying from SQLite.
-    pub(super) fn of(connection: &mut Connection) -> rusqlite::Result<Self> {
+    pub(super) fn take_over(connection: &mut Connection) -> rusqlite::Result<Self> {
         Self::with_full(connection, FULL_BYTES)
     }
 
@@ -116,7 +116,7 @@ mod tests {
         let mut connection = Connection::open(&path).unwrap();
         connection.pragma_update(None, "journal_mode", "WAL").unwrap();
         connection.execute_batch("CREATE TABLE blobs (bytes BLOB)").unwrap();
-        let log = Log::of(&mut connection).unwrap();
+        let log = Log::take_over(&mut connection).unwrap();
         let put = || {
             connection.execute("INSERT INTO blobs VALUES (zeroblob(?1))", [DUE_BYTES]).unwrap();
             log.copy(&connection).unwrap();

@@ -384,7 +384,7 @@ fn with_rollback_journal(directory: &Path) -> SqliteStore {
     let found = Mark::find(directory).unwrap();
     let last = last_known(&connection).unwrap();
     let mark = Mark::open(directory, &found, last).unwrap().into();
-    let log = Log::of(&mut connection).unwrap();
+    let log = Log::take_over(&mut connection).unwrap();
     SqliteStore {
         connection,
         path,

@@ -75,7 +75,7 @@ fn knowing_what_is_not_searched(
         for group in groups {
             let kept = |parameter: Parameter| {
                 let is_fixed = matches!(parameters[parameter as usize], Range::Fixed(_));
-                let has = parameter.of_setup().is_some_and(|one| one.of(setup).is_some());
+                let has = parameter.of_setup().is_some_and(|one| one.value_in(setup).is_some());
                 group.known.get(parameter).filter(|_| is_fixed && has)
             };
             group.known = KnownQuantities::new(Parameter::OF_SETUP.map(kept));
@@ -177,7 +177,7 @@ fn searched(
     chosen: [bool; 3],
 ) -> [Range; PARAMETERS] {
     for (parameter, _) in Parameter::ALL.into_iter().skip(7).zip(chosen).filter(|one| one.1) {
-        if let Some(value) = parameter.of_setup().and_then(|quantity| quantity.of(setup)) {
+        if let Some(value) = parameter.of_setup().and_then(|quantity| quantity.value_in(setup)) {
             let (lower, upper) = (0.999 * value, 1.001 * value);
             parameters[parameter as usize] = Range::Free { start: 1.0005 * value, lower, upper };
         }
