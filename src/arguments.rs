@@ -69,10 +69,9 @@ pub(crate) enum Command {
     Coordinator(CoordinatorArguments),
     /// Run a worker: compute realizations for a coordinator, until interrupted
     Worker(WorkerArguments),
-    /// Submit a job to a coordinator and print its id
-    Submit(SubmitArguments),
-    /// List the jobs of a coordinator
-    Jobs(JobsArguments),
+    /// Submit, list, follow, fetch and cancel the jobs of a coordinator
+    #[command(subcommand)]
+    Job(JobCommand),
     /// List the workers of a coordinator
     Workers(WorkersArguments),
     /// Print batch scripts for Slurm
@@ -81,19 +80,6 @@ pub(crate) enum Command {
     Health(HealthArguments),
     /// Copy the store of a coordinator while it runs
     Backup(BackupArguments),
-    /// Follow a job until it ends
-    ///
-    /// The maximum number of evaluations shown includes the evaluations for the derivatives at the
-    /// best point, one for each free parameter.
-    Watch(WatchArguments),
-    /// Explain why a job is not faster, and what would make it faster
-    Explain(ExplainArguments),
-    /// Cancel a job
-    Cancel(JobArguments),
-    /// Write the results of an ended job to a directory
-    Fetch(FetchArguments),
-    /// Compute an ended job again without a host that was banned later, and print whether a bit has changed
-    Recheck(WatchArguments),
     /// Create a certificate authority and certificates for coordinator, workers and clients
     Certs(CertsArguments),
     /// Create an access token and its entry for the coordinator's token list
@@ -114,6 +100,78 @@ pub(crate) enum Command {
     /// Write the manual pages, one for each command.
     #[command(hide = true)]
     Man(ManArguments),
+    /// Earlier names of commands.
+    #[command(flatten)]
+    Earlier(EarlierCommand),
+}
+
+/// The commands about jobs.
+#[derive(Debug, Subcommand)]
+pub(crate) enum JobCommand {
+    /// Submit a job to a coordinator and print its id
+    Submit(SubmitArguments),
+    /// List the jobs of a coordinator
+    List(JobListArguments),
+    /// Follow a job until it ends
+    ///
+    /// The maximum number of evaluations shown includes the evaluations for the derivatives at the
+    /// best point, one for each free parameter.
+    Watch(WatchArguments),
+    /// Explain why a job is not faster, and what would make it faster
+    Explain(ExplainArguments),
+    /// Cancel a job
+    Cancel(JobArguments),
+    /// Write the results of an ended job to a directory
+    Fetch(FetchArguments),
+    /// Compute an ended job again without a host that was banned later, and print whether a bit has changed
+    Recheck(WatchArguments),
+    /// Delete ended jobs (without options, all of them) and print their ids
+    Prune(PruneArguments),
+}
+
+/// The commands about jobs by the names that they had before; they do the same.
+#[derive(Debug, Subcommand)]
+pub(crate) enum EarlierCommand {
+    /// Same as `osteon job submit`
+    #[command(hide = true)]
+    Submit(SubmitArguments),
+    /// Same as `osteon job list`
+    #[command(hide = true)]
+    Jobs(JobsArguments),
+    /// Same as `osteon job watch`
+    #[command(hide = true)]
+    Watch(WatchArguments),
+    /// Same as `osteon job explain`
+    #[command(hide = true)]
+    Explain(ExplainArguments),
+    /// Same as `osteon job cancel`
+    #[command(hide = true)]
+    Cancel(JobArguments),
+    /// Same as `osteon job fetch`
+    #[command(hide = true)]
+    Fetch(FetchArguments),
+    /// Same as `osteon job recheck`
+    #[command(hide = true)]
+    Recheck(WatchArguments),
+}
+
+impl From<EarlierCommand> for JobCommand {
+    fn from(earlier: EarlierCommand) -> Self {
+        match earlier {
+            EarlierCommand::Submit(arguments) => Self::Submit(arguments),
+            EarlierCommand::Jobs(JobsArguments { command: None, list }) => Self::List(list),
+            EarlierCommand::Jobs(JobsArguments { command: Some(command), list }) => {
+                let JobsCommand::Prune(prune) = command;
+                let (client, json) = (prune.client.or(list.client), prune.json || list.json);
+                Self::Prune(PruneArguments { client, json, ..prune })
+            }
+            EarlierCommand::Watch(arguments) => Self::Watch(arguments),
+            EarlierCommand::Explain(arguments) => Self::Explain(arguments),
+            EarlierCommand::Cancel(arguments) => Self::Cancel(arguments),
+            EarlierCommand::Fetch(arguments) => Self::Fetch(arguments),
+            EarlierCommand::Recheck(arguments) => Self::Recheck(arguments),
+        }
+    }
 }
 
 /// Arguments of `identify` and `propagate`.
@@ -140,7 +198,7 @@ pub(crate) struct RunArguments {
     /// Credentials for the coordinator.
     #[command(flatten)]
     pub(crate) credentials: CredentialArguments,
-    /// Name of the job, shown by `osteon jobs` and in logs (at most 256 bytes)
+    /// Name of the job, shown by `osteon job list` and in logs (at most 256 bytes)
     #[arg(long, value_name = "TEXT", value_parser = job_name)]
     pub(crate) name: Option<String>,
     /// Directory for the results. Repeating the command resumes an interrupted run, or shows the
@@ -160,7 +218,7 @@ pub(crate) struct RunArguments {
     #[arg(long)]
     pub(crate) json: bool,
     /// Format of the progress on stderr. text: for people; json: for programs, one object per line
-    /// with the keys of `osteon jobs --json`, below the key `progress`. With json the run ends when
+    /// with the keys of `osteon job list --json`, below the key `progress`. With json the run ends when
     /// stderr is closed
     #[arg(
         long,
@@ -275,7 +333,7 @@ pub(crate) struct SubmitArguments {
     /// (at most 256 bytes)
     #[arg(long, value_name = "ID", value_parser = request_id)]
     pub(crate) request_id: Option<String>,
-    /// Name of the job, shown by `osteon jobs` and in logs (at most 256 bytes)
+    /// Name of the job, shown by `osteon job list` and in logs (at most 256 bytes)
     #[arg(long, value_name = "TEXT", value_parser = job_name)]
     pub(crate) name: Option<String>,
     /// Priority among your own jobs, 0 to 9: jobs of higher priority run first
@@ -287,12 +345,9 @@ pub(crate) struct SubmitArguments {
     pub(crate) json: bool,
 }
 
-/// Arguments of `jobs`.
+/// Arguments of `job list`.
 #[derive(Debug, Args)]
-pub(crate) struct JobsArguments {
-    /// The operation; without one they are listed.
-    #[command(subcommand)]
-    pub(crate) command: Option<JobsCommand>,
+pub(crate) struct JobListArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
@@ -301,14 +356,25 @@ pub(crate) struct JobsArguments {
     pub(crate) json: bool,
 }
 
-/// Operations on jobs.
+/// Arguments of `jobs`, the earlier name of `job list`.
+#[derive(Debug, Args)]
+pub(crate) struct JobsArguments {
+    /// The operation; without one they are listed.
+    #[command(subcommand)]
+    pub(crate) command: Option<JobsCommand>,
+    /// What is listed.
+    #[command(flatten)]
+    pub(crate) list: JobListArguments,
+}
+
+/// Operations of `jobs`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobsCommand {
     /// Delete ended jobs (without options, all of them) and print their ids
     Prune(PruneArguments),
 }
 
-/// Arguments of `jobs prune`.
+/// Arguments of `job prune`.
 #[derive(Debug, Args)]
 pub(crate) struct PruneArguments {
     /// The coordinator.

@@ -63,12 +63,14 @@ fn left_by_interruption(resolved: &Resolved) -> Option<&'static str> {
         | Resolved::Health { .. } => Some("nothing was changed"),
         Resolved::Simulate { .. } => Some("no results were saved"),
         Resolved::Observe { .. } => Some("no file was written"),
-        Resolved::Submit { .. } => Some("the job may have been accepted (see `osteon jobs`)"),
-        Resolved::Prune { .. } => Some("jobs may have been deleted (see `osteon jobs`)"),
-        Resolved::Watch { .. } => Some("the job continues (see `osteon jobs`, `osteon cancel`)"),
-        Resolved::Recheck { .. } => Some("the job may be computed again (see `osteon jobs`)"),
+        Resolved::Submit { .. } => Some("the job may have been accepted (see `osteon job list`)"),
+        Resolved::Prune { .. } => Some("jobs may have been deleted (see `osteon job list`)"),
+        Resolved::Watch { .. } => {
+            Some("the job continues (see `osteon job list`, `osteon job cancel`)")
+        }
+        Resolved::Recheck { .. } => Some("the job may be computed again (see `osteon job list`)"),
         Resolved::Unban { .. } => Some("the ban may have been lifted (see `osteon workers`)"),
-        Resolved::Cancel { .. } => Some("the job may have been cancelled (see `osteon jobs`)"),
+        Resolved::Cancel { .. } => Some("the job may have been cancelled (see `osteon job list`)"),
         Resolved::Fetch { .. } => Some("run the same command again to fetch the results"),
         Resolved::DrainWorker { .. } => {
             Some("the worker may have been told to drain (see `osteon workers`)")

@@ -339,17 +339,12 @@ impl Resolved {
             }
             Command::Completions(arguments) => Self::Completions(arguments),
             Command::Man(arguments) => Self::Man(arguments),
-            Command::Submit(arguments) => client::submit(arguments, remote)?,
-            Command::Jobs(arguments) => client::jobs(arguments, remote)?,
+            Command::Job(command) => client::job(command, remote)?,
+            Command::Earlier(command) => client::job(command.into(), remote)?,
             Command::Workers(arguments) => client::workers(arguments, remote)?,
             Command::Slurm(arguments) => slurm::scripts(arguments, remote)?,
             Command::Health(arguments) => client::health(arguments, remote)?,
             Command::Backup(arguments) => client::backup(arguments, remote)?,
-            Command::Watch(arguments) => client::watch(arguments, remote)?,
-            Command::Explain(arguments) => client::explain(arguments, remote)?,
-            Command::Cancel(arguments) => client::cancel(arguments, remote)?,
-            Command::Recheck(arguments) => client::recheck(arguments, remote)?,
-            Command::Fetch(arguments) => client::fetch(arguments, remote)?,
         })
     }
 

@@ -1,4 +1,4 @@
-//! `osteon explain`: a job says what delays it, and `--log-format json` what happened, with real
+//! `osteon job explain`: a job says what delays it, and `--log-format json` what happened, with real
 //! processes.
 
 #![expect(clippy::panic, reason = "a test that cannot go on should say why")]

@@ -61,7 +61,7 @@ pub enum ClientError {
     },
     /// It is unknown whether the coordinator has accepted the job.
     #[error(
-        "{cause}; the coordinator may have accepted the job: `osteon submit` of the same job with \
+        "{cause}; the coordinator may have accepted the job: `osteon job submit` of the same job with \
          --request-id {request_id} prints its id and does not create a second job"
     )]
     Uncertain {

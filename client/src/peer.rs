@@ -123,7 +123,7 @@ impl Peer {
 /// as its clients are programs.
 fn hint(status: &Status) -> &'static str {
     match status::missing(status) {
-        Some(Resource::Job) => "; `osteon jobs` lists all jobs",
+        Some(Resource::Job) => "; `osteon job list` lists all jobs",
         Some(Resource::Worker) => "; `osteon workers` lists all that are attached",
         // The refusal says it.
         Some(Resource::Host) => "",

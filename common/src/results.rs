@@ -289,7 +289,7 @@ impl Integrity {
         match self.has_changed(digest) {
             None => format!(
                 "{host} {hosts} computed a part of this result and {was} banned for wrong answers after it \
-                 had ended: do not rely on it before `osteon recheck` has computed it again"
+                 had ended: do not rely on it before `osteon job recheck` has computed it again"
             ),
             Some(false) => format!(
                 "computed again without {host} {hosts}, which {was} banned for wrong answers: not a bit has \

@@ -170,13 +170,13 @@ class Relied(unittest.TestCase):
             role = ["token", holder, "--role", "read", "--tokens", str(tokens)]
             output(OSTEON, *role, "--out", str(self.directory / holder))
         coordinator, url = self.start_coordinator(f"--listen 127.0.0.1:0 --tokens {tokens}")
-        output(OSTEON, "jobs", "--coordinator", url, "--token-file", str(token))
+        output(OSTEON, "job", "list", "--coordinator", url, "--token-file", str(token))
         lines = tokens.read_text().splitlines(keepends=True)
         tokens.write_text("".join(line for line in lines if not line.startswith("ann ")))
         coordinator.send(signal.SIGHUP)
 
         def refused():
-            jobs = [OSTEON, "jobs", "--coordinator", url, "--token-file", str(token)]
+            jobs = [OSTEON, "job", "list", "--coordinator", url, "--token-file", str(token)]
             return subprocess.run(jobs, capture_output=True, timeout=60, check=False).returncode == 1
 
         wait_for("refusal of a token that was deleted", refused)

@@ -179,8 +179,8 @@ impl ResultFile {
         let (parameters, dispersion) = match (group, self) {
             (Some(name), _) => {
                 let found = self.groups().iter().find(|group| group.name == name);
-                let found =
-                    found.ok_or_else(|| BestPointError::unknown_group(name, self.groups()))?;
+                let names = || self.groups().iter().map(|group| group.name.as_str());
+                let found = found.ok_or_else(|| BestPointError::unknown_group(name, names()))?;
                 (&found.parameters, found.dispersion)
             }
             (None, Self::Identification(result)) => (&result.parameters, result.dispersion),

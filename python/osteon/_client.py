@@ -63,7 +63,7 @@ class Client:
         try:
             file = scratch.path / "job.toml"
             file.write_text(job.to_toml(kind), encoding="utf-8")
-            arguments = ["submit", str(file), "--json", "--priority", str(priority)]
+            arguments = ["job", "submit", str(file), "--json", "--priority", str(priority)]
             arguments += ["--propagate"] if kind == "propagation" else []
             arguments += [] if name is None else ["--name", name]
             arguments += [] if request_id is None else ["--request-id", request_id]
@@ -73,7 +73,7 @@ class Client:
 
     def jobs(self) -> list[JobState]:
         """The jobs that the coordinator knows, oldest first."""
-        return [JobState.from_json(entry) for entry in self._json(["jobs", "--json"])]
+        return [JobState.from_json(entry) for entry in self._json(["job", "list", "--json"])]
 
     def state(self, job: str) -> JobState:
         """The present state of a job."""
@@ -97,7 +97,7 @@ class Client:
 
         def follow() -> None:
             try:
-                self._run(["watch", job, "--json"], take)
+                self._run(["job", "watch", job, "--json"], take)
             except StopIteration:
                 pass
             except BaseException as error:
@@ -146,7 +146,7 @@ class Client:
 
     def cancel(self, job: str) -> None:
         """Cancels a job; one that has ended stays as it is."""
-        self._run(["cancel", job])
+        self._run(["job", "cancel", job])
 
     def fetch(self, job: str, *, out: str | os.PathLike[str] | None = None) -> Result:
         """The result of a job that has ended.
@@ -164,7 +164,7 @@ class Client:
         if out is None:
             scratch = Scratch()
             out = scratch.path / "results"
-        self._run(["fetch", job, "--out", os.fspath(out)])
+        self._run(["job", "fetch", job, "--out", os.fspath(out)])
         found = Result.read(out)
         result = Result(found.json, Path(out), scratch)
         if result.status == "cancelled":
@@ -183,7 +183,7 @@ class Client:
         """Runs a command and returns its output."""
         ended = _program.run([*arguments, *self._options], on_output=on_output)
         # A job that is watched and has failed is the answer, and no failure of the request.
-        if ended.exit_code != 0 and arguments[0] != "watch":
+        if ended.exit_code != 0 and arguments[:2] != ["job", "watch"]:
             messages = "\n".join(ended.messages)
             raise CoordinatorError(ended.complaint, ended.exit_code, messages)
         if ended.exit_code != 0 and ended.messages:

@@ -325,7 +325,7 @@ class Follower:
 def cancel(job: str, place: Place) -> None:
     """Cancels a job whose result nobody can fetch; what the coordinator answers changes nothing."""
     assert place.coordinator is not None
-    command = [str(_program.find()), "cancel", job, *options(place.coordinator, place.credentials)]
+    command = [str(_program.find()), "job", "cancel", job, *options(place.coordinator, place.credentials)]
     # A second Ctrl-C must not leave the job running.
     before = signal.getsignal(signal.SIGINT) if is_main_thread() else None
     if before is not None:

@@ -41,12 +41,12 @@ fn what_cannot_be_meant_is_refused() {
     check("osteon simulate a.toml --time-step -1e-8", "unexpected argument");
     check("osteon simulate a.toml --time-step inf", "it must be a number above 0");
     check("osteon study variance", "unrecognized subcommand");
-    check("osteon submit a.toml --priority 10", "10 is not in 0..=9");
+    check("osteon job submit a.toml --priority 10", "10 is not in 0..=9");
     for (age, unit) in
         [("30", ""), ("x", ""), ("-1", "d"), ("3", "w"), ("1e3", "s"), ("9999999", "d")]
     {
         check(
-            &format!("osteon jobs prune --older-than={age}{unit}"),
+            &format!("osteon job prune --older-than={age}{unit}"),
             "it must be a number with the unit",
         );
     }
@@ -61,15 +61,15 @@ fn what_cannot_be_meant_is_refused() {
     check("osteon worker --coordinator unix:a --give-up-after 0", "above 0");
     check("osteon worker --coordinator unix:a --time-limit 1e9", "at most");
     check("osteon coordinator --listen 127.0.0.1:0", "--store");
-    check("osteon submit a.toml --coordinator unix:a --request-id=", "1 to 256 bytes");
+    check("osteon job submit a.toml --coordinator unix:a --request-id=", "1 to 256 bytes");
     let long = "n".repeat(257);
-    check(&format!("osteon submit a.toml --name {long}"), "at most 256 bytes");
+    check(&format!("osteon job submit a.toml --name {long}"), "at most 256 bytes");
     check("osteon identify a.toml --name a\u{7}b", "no control characters");
     check("osteon health --timeout 0", "from 0.1 to 60");
     check("osteon health --timeout 61", "from 0.1 to 60");
     check("osteon workers drain one", "invalid digit");
     check("osteon backup", "<DIR>");
-    check("osteon fetch 1 --coordinator unix:a", "--out");
+    check("osteon job fetch 1 --coordinator unix:a", "--out");
     check("osteon report", "<DIR>...");
     check("osteon frobnicate", "unrecognized subcommand");
     check("osteon", "Usage");

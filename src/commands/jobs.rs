@@ -1,4 +1,4 @@
-//! `submit`, `jobs`, `watch`, `explain`, `cancel`, `fetch`: requests to a running coordinator.
+//! `osteon job …`: requests to a running coordinator.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -56,7 +56,7 @@ pub(super) async fn submit(
     Ok(ExitStatus::Done)
 }
 
-/// `jobs`: prints all jobs, and the workers that are banned.
+/// `list`: prints all jobs, and the workers that are banned.
 pub(super) async fn list(
     coordinator: &Remote,
     format: OutputFormat,
@@ -143,7 +143,9 @@ pub(super) async fn fetch(
     let fetched =
         user::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
             ClientError::Refused { code: Code::FailedPrecondition, reason, .. } => {
-                CommandFailure::failed(anyhow!("{reason}; wait for it with `osteon watch {job}`"))
+                CommandFailure::failed(anyhow!(
+                    "{reason}; wait for it with `osteon job watch {job}`"
+                ))
             }
             _ => CommandFailure::from(error),
         })?;

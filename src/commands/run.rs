@@ -198,7 +198,7 @@ async fn run_at(
             fetched = run::run(&mut client, job, show) => fetched,
             interruption = interruption => Err(CommandFailure::Interrupted(
                 interruption,
-                "a job that was accepted continues (see `osteon jobs`, `osteon cancel`)",
+                "a job that was accepted continues (see `osteon job list`, `osteon job cancel`)",
             )),
         },
     }

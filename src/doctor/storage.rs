@@ -57,7 +57,7 @@ pub(super) fn examine(directory: &Path) -> Diagnosis {
         return Diagnosis::warning(
             CHECK,
             found,
-            "free space, or delete ended jobs (`osteon jobs prune`)",
+            "free space, or delete ended jobs (`osteon job prune`)",
         );
     }
     if sync > SLOW {

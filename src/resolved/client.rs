@@ -9,8 +9,8 @@ use osteon_common::job::JobKind;
 use super::{Resolved, format, slurm};
 use crate::arguments::{
     BackupArguments, ClientArguments, ExplainArguments, FetchArguments, HealthArguments,
-    JobArguments, JobsArguments, JobsCommand, SubmitArguments, WatchArguments, WorkersArguments,
-    WorkersCommand,
+    JobArguments, JobCommand, JobListArguments, PruneArguments, SubmitArguments, WatchArguments,
+    WorkersArguments, WorkersCommand,
 };
 use crate::exit_status::CommandFailure;
 
@@ -22,8 +22,45 @@ pub(super) trait FindCoordinator:
 
 impl<F: Fn(ClientArguments) -> Result<Remote, CommandFailure>> FindCoordinator for F {}
 
-/// Resolves `submit`.
-pub(super) fn submit(
+/// Resolves a command about jobs.
+pub(super) fn job(
+    command: JobCommand,
+    remote: impl FindCoordinator,
+) -> Result<Resolved, CommandFailure> {
+    Ok(match command {
+        JobCommand::Submit(arguments) => submit(arguments, remote)?,
+        JobCommand::List(JobListArguments { client, json }) => {
+            Resolved::Jobs { coordinator: remote(client)?, format: format(json) }
+        }
+        JobCommand::Watch(WatchArguments { job, json }) => {
+            Resolved::Watch { job: job.job, coordinator: remote(job.client)?, format: format(json) }
+        }
+        JobCommand::Explain(ExplainArguments { job, client, json }) => {
+            Resolved::Explain { job, coordinator: remote(client)?, format: format(json) }
+        }
+        JobCommand::Cancel(JobArguments { job, client }) => {
+            Resolved::Cancel { job, coordinator: remote(client)? }
+        }
+        JobCommand::Fetch(FetchArguments { job, client, out }) => {
+            Resolved::Fetch { job, coordinator: remote(client)?, out }
+        }
+        JobCommand::Recheck(WatchArguments { job, json }) => Resolved::Recheck {
+            job: job.job,
+            coordinator: remote(job.client)?,
+            format: format(json),
+        },
+        JobCommand::Prune(PruneArguments { client, older_than, keep_last, json }) => {
+            Resolved::Prune {
+                older_than,
+                keep_last,
+                coordinator: remote(client)?,
+                format: format(json),
+            }
+        }
+    })
+}
+
+fn submit(
     arguments: SubmitArguments,
     remote: impl FindCoordinator,
 ) -> Result<Resolved, CommandFailure> {
@@ -37,23 +74,6 @@ pub(super) fn submit(
         options: SubmitOptions { priority, name: name.unwrap_or_default() },
         coordinator: remote(client)?,
         format: format(json),
-    })
-}
-
-/// Resolves `jobs` and its subcommands.
-pub(super) fn jobs(
-    arguments: JobsArguments,
-    remote: impl FindCoordinator,
-) -> Result<Resolved, CommandFailure> {
-    let JobsArguments { command, client, json } = arguments;
-    Ok(match command {
-        None => Resolved::Jobs { coordinator: remote(client)?, format: format(json) },
-        Some(JobsCommand::Prune(prune)) => Resolved::Prune {
-            older_than: prune.older_than,
-            keep_last: prune.keep_last,
-            coordinator: remote(prune.client.or(client))?,
-            format: format(json || prune.json),
-        },
     })
 }
 
@@ -101,58 +121,5 @@ pub(super) fn backup(
         directory: arguments.directory,
         coordinator: remote(arguments.client)?,
         format: format(arguments.json),
-    })
-}
-
-/// Resolves `watch`.
-pub(super) fn watch(
-    arguments: WatchArguments,
-    remote: impl FindCoordinator,
-) -> Result<Resolved, CommandFailure> {
-    let WatchArguments { job, json } = arguments;
-    Ok(Resolved::Watch { job: job.job, coordinator: remote(job.client)?, format: format(json) })
-}
-
-/// Resolves `explain`.
-pub(super) fn explain(
-    arguments: ExplainArguments,
-    remote: impl FindCoordinator,
-) -> Result<Resolved, CommandFailure> {
-    Ok(Resolved::Explain {
-        job: arguments.job,
-        coordinator: remote(arguments.client)?,
-        format: format(arguments.json),
-    })
-}
-
-/// Resolves `recheck`.
-pub(super) fn recheck(
-    arguments: WatchArguments,
-    remote: impl FindCoordinator,
-) -> Result<Resolved, CommandFailure> {
-    Ok(Resolved::Recheck {
-        job: arguments.job.job,
-        coordinator: remote(arguments.job.client)?,
-        format: format(arguments.json),
-    })
-}
-
-/// Resolves `cancel`.
-pub(super) fn cancel(
-    arguments: JobArguments,
-    remote: impl FindCoordinator,
-) -> Result<Resolved, CommandFailure> {
-    Ok(Resolved::Cancel { job: arguments.job, coordinator: remote(arguments.client)? })
-}
-
-/// Resolves `fetch`.
-pub(super) fn fetch(
-    arguments: FetchArguments,
-    remote: impl FindCoordinator,
-) -> Result<Resolved, CommandFailure> {
-    Ok(Resolved::Fetch {
-        job: arguments.job,
-        coordinator: remote(arguments.client)?,
-        out: arguments.out,
     })
 }

@@ -102,7 +102,7 @@ def a_job_survives_a_lost_node_and_is_queued_again(slurm, osteon, work):
         with contextlib.suppress(OSError):
             url, private = (store / "address").read_text().strip(), store / f"slurm-{job}"
             listed = osteon.call(
-                "jobs", "--json", "--coordinator", url,
+                "job", "list", "--json", "--coordinator", url,
                 "--tls-ca", private / "ca.pem", "--token-file", private / "token", check=False,
             )  # fmt: skip
             jobs = json.loads(listed or "[]")
@@ -223,10 +223,10 @@ def workers_follow_the_queue_of_jobs(slurm, osteon, work):
         log = work / "scaling.log"
         with osteon.service(log, *words) as process:
             for _ in range(2):
-                submitted = osteon.call("submit", file, "--coordinator", url, "--json")
+                submitted = osteon.call("job", "submit", file, "--coordinator", url, "--json")
                 job = json.loads(submitted)["job"]
                 wait_for("workers come", lambda: active() > 0, STEP_S_MAX)
-                osteon.call("watch", job, "--coordinator", url)
+                osteon.call("job", "watch", job, "--coordinator", url)
                 assert 0 < len(set(slurm.jobs()) - known), slurm.jobs()
                 assert active() <= 3, slurm.jobs()
                 wait_for("workers go", lambda: active() == 0, STEP_S_MAX)

@@ -4,8 +4,6 @@ use osteon_common::field_path::quoted;
 use osteon_common::version::RESULT_SCHEMA;
 use thiserror::Error;
 
-use super::Group;
-
 /// Longest cause that a message repeats: it may hold a value of the file.
 const CAUSE_CHARACTERS_MAX: usize = 300;
 
@@ -84,9 +82,8 @@ pub enum BestPointError {
 }
 
 impl BestPointError {
-    pub(super) fn unknown_group(name: &str, groups: &[Group]) -> Self {
-        let names = groups.iter().map(|group| group.name.clone()).collect();
-        Self::UnknownGroup { name: name.to_owned(), names }
+    pub(super) fn unknown_group<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Self {
+        Self::UnknownGroup { name: name.to_owned(), names: names.map(str::to_owned).collect() }
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) fn note_doubts(turn: &mut Turn, ban: u64, jobs: Vec<JobId>) {
             ended.doubts.add(DoubtRecord { job, ban, digest: None });
             ended.sequence = sequence(ended.sequence, turn.now);
             tracing::error!(%job, ban, "a host that computed a part of this ended job is banned; compute the \
-                job again with `osteon recheck`");
+                job again with `osteon job recheck`");
         }
     }
 }
