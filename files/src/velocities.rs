@@ -11,6 +11,7 @@ mod cells;
 mod choice;
 mod collected;
 mod column_choice;
+mod column_roles;
 mod columns;
 mod content;
 mod csv_format;
@@ -27,6 +28,7 @@ mod names;
 mod number;
 mod opening;
 mod problem;
+mod row_kinds;
 mod row_names;
 mod shapes;
 mod statistics;
@@ -51,7 +53,8 @@ use self::lines::{TableLine, TableLines};
 use self::problem::{LocatedProblem, Problem, shortened};
 
 pub(crate) use self::collected::Measured;
-pub(crate) use self::columns::{NamedColumns, is_like_subject};
+pub(crate) use self::column_roles::{is_like_group, is_like_subject};
+pub(crate) use self::columns::NamedColumns;
 pub(crate) use self::csv_format::{CsvFormat, DecimalMark, Separator, VelocityUnit};
 pub(crate) use self::table::VelocityTable;
 

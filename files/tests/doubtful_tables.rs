@@ -221,3 +221,86 @@ fn marks_and_signs_are_asked_about() {
         "line 3: velocity is \"7777\", far from the others",
     );
 }
+
+#[test]
+fn a_row_that_begins_a_block_is_a_measurement() {
+    let merged =
+        "patient,rep,velocity (m/s)\nP1,1,3901\n,2,3884\n,3,3890\nP2,1,3892\n,2,3907\n,3,3899\n";
+    takes(merged, &[3901.0, 3884.0, 3890.0, 3892.0, 3907.0, 3899.0], "6 velocities");
+    let noted = "patient,note,velocity (m/s)\nP1,first,3901\nP1,,3884\nP1,,3890\nP2,first,3892\nP2,,3907\nP2,,3899\n";
+    takes(noted, &[3901.0, 3884.0, 3890.0, 3892.0, 3907.0, 3899.0], "6 velocities");
+    // Among coarse numbers any may be the mean of those above.
+    takes(
+        "id,velocity\n1,3901\n2,3884\n3,3900\n4b,3895\n5,3910\n",
+        &[3901.0, 3884.0, 3900.0, 3895.0, 3910.0],
+        "5 velocities",
+    );
+}
+
+#[test]
+fn statistics_below_a_column_are_left_out_or_asked_about() {
+    let four = "velocity (m/s)\n4094.3\n4168.6\n3960.7\n4084.4\n";
+    let taken = [4094.3, 4168.6, 3960.7, 4084.4];
+    for below in ["\n4077.0\n", "\n4077.025\n"] {
+        takes(&format!("{four}{below}"), &taken, "line 7");
+    }
+    refuses(&format!("{four}\n4168.6\n3960.7\n"), "line 7: the velocity is \"4168.6\"");
+    refuses(&format!("{four}4077.0\n"), "write it with a decimal more");
+    takes(&format!("{four}\n4101.2\n"), &[4094.3, 4168.6, 3960.7, 4084.4, 4101.2], "5 velocities");
+    let blocks = "velocity\n3901.1\n3922.0\n3950.5\n3924.53\n3875.0\n3911.4\n3893.2\n3893.20\n";
+    takes(
+        &blocks.replace("3893.20", "3893.2000"),
+        &[3901.1, 3922.0, 3950.5, 3875.0, 3911.4, 3893.2],
+        "2 rows left out",
+    );
+}
+
+#[test]
+fn means_of_groups_are_asked_about() {
+    for (text, which) in [
+        ("site,velocity\nA,3948.1\nA,3743.3\nB,3976.4\nB,4043.8\n\nA,3845.7\nB,4010.1\n", "last"),
+        (
+            "patient,rep,velocity\nP1,,3845.7\nP1,1,3948.1\nP1,2,3743.3\nP2,,4010.1\nP2,1,3976.4\nP2,2,4043.8\n",
+            "first",
+        ),
+    ] {
+        refuses(text, &format!("the {which} row has the mean of the others"));
+    }
+    let other = "site,velocity\nA,3948.1\nA,3743.3\nA,3845.7\nB,3976.4\nB,4043.8\nB,4012.1\n";
+    takes(other, &[3948.1, 3743.3, 3845.7, 3976.4, 4043.8, 4012.1], "6 velocities");
+}
+
+#[test]
+fn what_other_columns_say_of_the_rows_is_heeded() {
+    let wide = "Patient,Velocity (m/s),,\nP1,2940.7,2802.4,2529.8\nP2,3025.3,2740.1,2887.4\n";
+    refuses(wide, "column 3 has no name, and numbers like those of `Velocity (m/s)`");
+    let modes = "id,mode,velocity\n1,L,3469.8\n1,T,1734.9\n2,L,3507.2\n2,T,1753.6\n";
+    refuses(modes, "the velocities where `mode` is \"L\" have a mean of 3488.5 m/s");
+    for (name, cells) in
+        [("status", ["OK", "INVALID"]), ("excluded", ["", "yes"]), ("type", ["meas", "cal"])]
+    {
+        let [yes, no] = cells;
+        let text = format!(
+            "id,velocity,{name}\n1,4100.1,{yes}\n2,4115.5,{yes}\n3,4200.4,{no}\n4,4051.0,{yes}\n"
+        );
+        takes(&text, &[4100.1, 4115.5, 4200.4, 4051.0], &format!("the column {name:?} ("));
+    }
+    let titles =
+        "Nr,velocity\nPatient,2601\n1,2944.7\n2,2948.2\nPatient,2602\n1,2854.2\n2,2944.2\n";
+    refuses(titles, "the velocity of \"Patient\" is \"2602\"");
+    refuses(
+        "nr,velocity\n1,3948.1\n2,3743.3\nprobe no.,4001\n3,3976.4\n4,4043.8\n",
+        "\"probe no.\"",
+    );
+    let named =
+        "# missing value = 4444.0\nid,velocity\n1,4167.3\n2,4245.5\n3,4444.0\n4,4096.4\n5,4444.0\n";
+    refuses(named, "a comment names \"4444.0\" with missing values");
+    let range = "id,velocity\n1,10000\n2,4187.5\n3,4256.7\n4,4025.1\n5,10000\n6,4136.2\n";
+    refuses(range, "velocity is \"10000\", far from the others");
+    for name in ["rotor speed", "angular velocity", "RPM speed", "velocity gradient"] {
+        refuses(
+            &format!("run,{name}\n1,2911\n2,3016\n3,3099\n"),
+            "no column is clearly that of the velocities",
+        );
+    }
+}

@@ -4,24 +4,10 @@ use std::collections::BTreeSet;
 
 use osteon_common::limits;
 
-use crate::velocities::{NamedColumns, VelocityTable, is_like_subject};
+use crate::velocities::{NamedColumns, VelocityTable, is_like_group, is_like_subject};
 
 /// Fewest velocities of a group, on average, for a search of its own.
 const OF_A_GROUP_MIN: usize = 5;
-/// Names of columns whose values are groups rather than subjects.
-const LIKE_GROUPS: [&str; 10] = [
-    "group",
-    "cohort",
-    "class",
-    "site",
-    "side",
-    "sex",
-    "treatment",
-    "diagnosis",
-    "region",
-    "gruppe",
-];
-
 /// The columns of groups and subjects, if there are any.
 #[derive(Debug)]
 pub(super) struct Roles {
@@ -83,13 +69,12 @@ impl Roles {
 
 /// Returns the columns that have names which repeat, and seem to name groups or subjects.
 fn named_columns(table: &VelocityTable) -> Vec<NameColumn> {
-    let is_group = |name: &str| LIKE_GROUPS.iter().any(|part| name.contains(part));
     let mut columns: Vec<(usize, bool, BTreeSet<String>)> = Vec::new();
     for (place, name) in table.names().iter().enumerate() {
         let lower = name.to_lowercase();
         let is_once = table.names().iter().filter(|other| *other == name).count() == 1;
-        if place != table.place() && is_once && (is_group(&lower) || is_like_subject(&lower)) {
-            columns.push((place, is_group(&lower), BTreeSet::new()));
+        if place != table.place() && is_once && (is_like_group(&lower) || is_like_subject(&lower)) {
+            columns.push((place, is_like_group(&lower), BTreeSet::new()));
         }
     }
     let mut rows = 0;

@@ -27,6 +27,8 @@ pub(crate) struct Account {
     pub(super) missing: u32,
     /// Number of lines below the header that are comments.
     pub(super) comments: usize,
+    /// What the user should know of another column.
+    note: Option<String>,
     /// Two groups whose names hardly differ.
     pub(super) alike: Option<[String; 2]>,
 }
@@ -47,6 +49,7 @@ impl Account {
             left_out_count: 0,
             missing: 0,
             comments: 0,
+            note: table.note.clone(),
             alike: None,
         }
     }
@@ -106,6 +109,7 @@ impl Account {
         if self.errors > 0 {
             said.push(format!("the errors behind {} of the velocities are not used", self.errors));
         }
+        said.extend(self.note.clone());
         if let Some([first, second]) = &self.alike {
             said.push(format!(
                 "the groups {first:?} and {second:?} differ only by case or blanks: are they one?"

@@ -4,14 +4,11 @@ use osteon_common::check::{DECAY, VELOCITY};
 use osteon_common::parameters::Parameter;
 
 use super::column_choice::ColumnChoice;
+use super::column_roles::is_like_subject;
 use super::encodings::normalised;
 use super::number::CellNumber;
 use super::problem::{Problem, shortened};
 use super::table::{VelocityTable, place_of};
-
-/// Names of columns that seem to name the subject of each velocity.
-const LIKE_SUBJECTS: [&str; 7] =
-    ["subject", "subject_id", "patient", "patient_id", "specimen", "specimen_id", "id"];
 
 /// The columns that are named in a job file.
 #[derive(Debug, Clone, Default)]
@@ -216,9 +213,4 @@ impl NamedColumn {
 /// Returns whether a text may stand for a missing value: it is short, and no number in any reading.
 fn is_no_number(text: &str) -> bool {
     text.chars().count() <= MISSING_CHARACTERS_MAX && !text.contains(|c: char| c.is_numeric())
-}
-
-/// Returns whether a column seems to name subjects, given its name in lower case.
-pub(crate) fn is_like_subject(name: &str) -> bool {
-    LIKE_SUBJECTS.contains(&name)
 }

@@ -182,7 +182,17 @@ pub(super) const OTHER_BEHIND: [&str; 53] = [
     "angle",
 ];
 /// Words of velocities that are none of bone, wherever they stand.
-pub(super) const OTHER_THINGS: [&str; 15] = [
+pub(super) const OTHER_THINGS: [&str; 25] = [
+    "rotor",
+    "spindle",
+    "shaft",
+    "fan",
+    "angular",
+    "rpm",
+    "gradient",
+    "drehgeschwindigkeit",
+    "motordrehzahl",
+    "gait",
     "water",
     "wasser",
     "eau",

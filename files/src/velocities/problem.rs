@@ -174,9 +174,43 @@ pub(crate) enum Problem {
     UnitOfCell { found: String, given: &'static str },
     #[error("{}", doubt_of_row(label, found, *.others))]
     DoubtfulSummary { label: String, found: String, others: f64 },
+    #[error(
+        "the velocity of {word:?} is {found:?}, and the other rows have a number in place of that word: if the \
+         row is no measurement, delete it, and otherwise give it a number"
+    )]
+    OtherRow { word: String, found: String },
+    #[error(
+        "in each group of the column `{column}` the {which} row has the mean of the others: delete these rows, or, \
+         if they are measurements, the column"
+    )]
+    GroupMeans { column: String, which: &'static str },
+    #[error(
+        "the velocities where `{column}` is {first:?} have a mean of {first_mean:.1} m/s, and where it is \
+         {second:?} of {second_mean:.1} m/s: keep rows of one kind, or identify each by itself: [data] group = \
+         {column:?}"
+    )]
+    DifferentThings {
+        column: String,
+        first: String,
+        first_mean: f64,
+        second: String,
+        second_mean: f64,
+    },
+    #[error(
+        "column {place} has no name, and numbers like those of `{column}` beside it: give it a name, or say which \
+         column it is: [data] column = {column:?}"
+    )]
+    Nameless { place: usize, column: String },
+    #[error(
+        "a comment names {found:?} with missing values: if it stands for none, [data] missing = [{found:?}], and \
+         otherwise delete the comment"
+    )]
+    NamedMissing { found: String },
     #[error("has too many rows that seem to sum up others; leave them out of the file")]
     ManySummaries,
-    #[error("has no row below the header; each must have a velocity")]
+    #[error(
+        "has no row below the header; each must have a velocity, and none begins with #, as comments do"
+    )]
     NoRowsBelow,
     #[error("the header has the column `{column}` twice")]
     RepeatedColumn { column: String },
@@ -207,7 +241,7 @@ pub(crate) enum Problem {
     TooManyGroups,
     #[error(
         "the number of fields is {found}; the header has {expected} (a field that contains the separator, or a \
-         decimal comma, must stand in quotes)"
+         decimal comma, must stand in quotes; what is no row must begin with #)"
     )]
     FieldCount { found: usize, expected: usize },
     #[error("a quote is not closed, or stands inside a field")]
@@ -289,6 +323,7 @@ impl Problem {
 /// Asks whether a row is a measurement.
 fn doubt_of_row(label: &str, found: &str, others: f64) -> String {
     let (row, cure) = match label {
+        label if label == found => (String::new(), "write it with a decimal more".to_owned()),
         "" => (String::new(), "fill its other cells".to_owned()),
         label => (format!(" of {label:?}"), "give it another name".to_owned()),
     };

@@ -22,6 +22,8 @@ const WORD_MIN: usize = 3;
 /// The shape that most rows have, without their velocity; empty if there is none.
 pub(super) struct UsualShape {
     shape: Vec<String>,
+    /// The shape of the first row, which a row that begins a block may share: others leave its name away.
+    first: Vec<String>,
     /// Columns with decimals, which are no names.
     decimals: BTreeSet<usize>,
 }
@@ -30,6 +32,7 @@ impl UsualShape {
     pub(super) fn of_rows(text: &str, header: &Header, place: usize) -> Self {
         let mut counts: BTreeMap<Vec<String>, usize> = BTreeMap::new();
         let (mut rows, mut decimals) = (0_usize, BTreeSet::new());
+        let mut first = Vec::new();
         for line in TableLines::after_header(text, header, Some(place)) {
             let Ok((_, TableLine::Data(fields))) = line else { continue };
             if rows == ROWS_MAX {
@@ -39,6 +42,9 @@ impl UsualShape {
             let are_decimals = |field: &String| field.contains(['.', ',']) && is_number(field);
             decimals.extend((0..fields.len()).filter(|&at| are_decimals(&fields[at])));
             let shape = of_fields(&fields, place);
+            if rows == 1 {
+                first.clone_from(&shape);
+            }
             if counts.len() < SHAPES_MAX || counts.contains_key(&shape) {
                 *counts.entry(shape).or_default() += 1;
             }
@@ -46,20 +52,43 @@ impl UsualShape {
         let usual = counts.into_iter().max_by_key(|(_, count)| *count);
         let is_usual = |count: usize| count >= ROWS_MIN && count as f64 >= USUAL * rows as f64;
         let shape = usual.filter(|(_, count)| is_usual(*count)).map(|(shape, _)| shape);
-        Self { shape: shape.unwrap_or_default(), decimals }
+        Self { shape: shape.unwrap_or_default(), first, decimals }
     }
 
-    /// Returns whether a row has another shape than most.
+    /// Returns whether a row has another shape than most, and than the first.
     pub(super) fn is_odd(&self, fields: &[String], place: usize) -> bool {
-        !self.shape.is_empty() && of_fields(fields, place) != self.shape
+        if self.shape.is_empty() {
+            return false;
+        }
+        let shape = of_fields(fields, place);
+        shape != self.shape && shape != self.first
+    }
+
+    /// Returns whether a row has nothing in a column in which most have something.
+    pub(super) fn has_gap(&self, fields: &[String], place: usize) -> bool {
+        let is_gap = |(at, field): (usize, &String)| {
+            at != place
+                && field.is_empty()
+                && self.shape.get(at).is_some_and(|usual| !usual.is_empty())
+        };
+        fields.iter().enumerate().any(is_gap)
     }
 
     /// Returns whether a row has a word where most have a number, or a name with one.
     pub(super) fn has_word(&self, fields: &[String], place: usize) -> bool {
+        self.has_word_for(fields, place, |usual| usual.contains('9'))
+    }
+
+    /// Returns whether a row has a word where most have a number.
+    pub(super) fn has_word_for_number(&self, fields: &[String], place: usize) -> bool {
+        self.has_word_for(fields, place, |usual| usual == "9")
+    }
+
+    fn has_word_for(&self, fields: &[String], place: usize, is_replaced: fn(&str) -> bool) -> bool {
         let is_word = |(at, field): (usize, &String)| {
             at != place
                 && !self.decimals.contains(&at)
-                && self.shape.get(at).is_some_and(|usual| usual.contains('9'))
+                && self.shape.get(at).is_some_and(|usual| is_replaced(usual))
                 && field.chars().filter(|c| c.is_alphabetic()).count() >= WORD_MIN
                 && !field.contains(|c: char| c.is_numeric())
         };

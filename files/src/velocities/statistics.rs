@@ -181,7 +181,8 @@ impl SummaryLabel {
         let folded = if cell.is_ascii() { cell.to_ascii_lowercase() } else { folded(cell) };
         let words: Vec<&str> =
             folded.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
-        if words.len() > WORDS_MAX {
+        // "Out of range" is no range.
+        if words.len() > WORDS_MAX || words.first() == Some(&"out") {
             return None;
         }
         let is_word = |word: &&str| WORDS.iter().any(|(_, list)| list.contains(word));

@@ -12,7 +12,7 @@ use super::header::Header;
 use super::number::CellNumber;
 use super::problem::{LocatedProblem, Problem, shortened};
 use super::statistics::{Statistic, Statistics};
-use super::summed_rows::{SummedRows, Suspect, Unlike};
+use super::summed_rows::{SummedRows, Suspect, TELLING, Unlike};
 
 /// Most values that are looked at for those rows, all in all.
 const WORK_MAX: usize = 50_000_000;
@@ -102,7 +102,7 @@ impl Judge<'_> {
             (Some(label), _) => !label.is_like_name || self.is_at_end(one) || is_found,
             (None, Unlike::Bare) => self.is_at_end(one) && self.rows.is_bareness_noticed(),
             // The first name may be unlike the others.
-            (None, Unlike::Edge) => one.above > 0,
+            (None, Unlike::Edge) => one.above > 0 || one.has_word,
             (None, _) => true,
         }
     }
@@ -114,13 +114,20 @@ impl Judge<'_> {
     /// Returns whether the value is what the label says, of some of the rows.
     fn is_found(&self, one: &Suspect, sets: &[Option<Statistics>]) -> bool {
         let Some(value) = &one.value else { return false };
+        // Where numbers are coarse, any may have such a value.
+        let is_telling = |set: &&Statistics, rounding: f64| {
+            one.label.is_some()
+                || one.unlike != Unlike::Edge
+                || rounding < TELLING * set.value(Statistic::Deviation)
+        };
         let rounding = value.rounding(self.choice.unit) + self.rows.rounding;
         let in_cell = value.value();
         let velocity = value.velocity(self.choice.unit);
         let is = |statistic: Statistic| {
             let is_count = statistic == Statistic::Count;
             let value = if is_count { in_cell } else { velocity };
-            sets.iter().flatten().any(|set| set.is(statistic, value, rounding))
+            let mut telling = sets.iter().flatten().filter(|set| is_telling(set, rounding));
+            telling.any(|set| set.is(statistic, value, rounding))
                 || is_count && in_cell == self.rows.count as f64
         };
         match &one.label {

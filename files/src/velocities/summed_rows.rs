@@ -1,5 +1,7 @@
 //! The rows of a table, with those apart that may sum up others.
 
+use std::collections::BTreeSet;
+
 use osteon_common::limits;
 
 use super::column_choice::ColumnChoice;
@@ -21,7 +23,20 @@ const ROWS_MIN: usize = 4;
 /// Fewest velocities of which one that equals their mean is noticed.
 const MEAN_OF_MIN: usize = 2;
 /// Up to what share of the deviation a value may be rounded, if it tells something that it equals the mean.
-const TELLING: f64 = 0.025;
+pub(super) const TELLING: f64 = 0.025;
+/// Most different words for which it is asked what rows are that have them where others have numbers.
+const WORDS_MAX: usize = 3;
+/// Most rows behind a gap that may sum up those above it, and fewest of these.
+const TAIL_MAX: usize = 4;
+const TAIL_OF_MIN: usize = 3;
+/// Statistics that rows behind a gap are compared with, where there are several.
+const OF_TAIL: [Statistic; 5] = [
+    Statistic::Mean,
+    Statistic::Median,
+    Statistic::Deviation,
+    Statistic::Largest,
+    Statistic::Smallest,
+];
 /// Share of rows that have a cell before the velocity, where a row without them is noticed.
 const FILLED: f64 = 0.8;
 
@@ -37,14 +52,51 @@ pub(super) struct SummedRows {
     pub(super) count: usize,
     /// Number of rows with a cell before the velocity.
     filled: usize,
-    /// Sum of the velocities, and of those behind the last suspect, with their number.
-    sum: f64,
-    last_sum: f64,
-    last_count: usize,
+    /// The velocities, and those behind the last suspect.
+    all: RunningMoments,
+    recent: RunningMoments,
     /// Rows at the end of the table, so far, that have words where others have numbers.
     edge: Vec<Suspect>,
+    /// Such rows that others follow, with their words, as long as these are few.
+    words: Vec<Suspect>,
+    different_words: BTreeSet<String>,
+    /// The rows behind the last gap, and the number of velocities above it.
+    tail: Vec<Suspect>,
+    above_gap: usize,
 }
+
+/// Number, sum and sum of the squares of velocities.
+#[derive(Debug, Clone, Copy, Default)]
+struct RunningMoments {
+    count: usize,
+    sum: f64,
+    squares: f64,
+}
+
+impl RunningMoments {
+    fn add(&mut self, velocity: f64) {
+        self.count += 1;
+        self.sum += velocity;
+        self.squares += velocity * velocity;
+    }
+
+    /// Returns whether a value is their mean.
+    fn have_mean(&self, value: f64, rounding: f64) -> bool {
+        self.count >= MEAN_OF_MIN
+            && (value - self.sum / self.count as f64).abs() <= rounding * 1.000_001
+    }
+
+    /// Returns whether numbers that are rounded so are fine enough to tell their mean from other values.
+    fn are_told_apart(&self, rounding: f64) -> bool {
+        let count = self.count as f64;
+        let mean = self.sum / count;
+        let variance = (self.squares - count * mean * mean) / (count - 1.0);
+        rounding < TELLING * variance.max(0.0).sqrt()
+    }
+}
+
 /// A row that may sum up others.
+#[derive(Clone)]
 pub(super) struct Suspect {
     pub(super) line: usize,
     pub(super) label: Option<SummaryLabel>,
@@ -54,6 +106,8 @@ pub(super) struct Suspect {
     /// Whether it stands apart from the rows above it.
     pub(super) is_apart: bool,
     pub(super) unlike: Unlike,
+    /// Whether it has a word where most others have a number.
+    pub(super) has_word: bool,
     /// Its label, first name or velocity, for messages.
     pub(super) shown: String,
 }
@@ -70,6 +124,7 @@ pub(super) enum Unlike {
     /// In nothing but its value.
     Value,
 }
+
 /// A row of the table as it was read, and the label of a summary that stands in it or above it.
 struct ReadRow {
     line: usize,
@@ -133,6 +188,7 @@ impl SummedRows {
                 return Err((None, Problem::TooMany));
             }
             let row = rows.describe(row, choice, &usual, are_bare_noticed);
+            rows.note_gap(&row);
             last = rows.take(row, choice);
             if rows.suspects.len() > ROWS_MAX {
                 let are_labelled = rows.suspects.last().is_some_and(|one| one.label.is_some());
@@ -143,7 +199,10 @@ impl SummedRows {
             }
         }
         rows.suspects.append(&mut rows.edge);
-        rows.suspect_last(last, choice);
+        rows.ask_of_words()?;
+        if !rows.suspect_tail(choice) {
+            rows.suspect_last(last, choice);
+        }
         Ok(rows)
     }
 
@@ -161,7 +220,7 @@ impl SummedRows {
         let before = fields.get(..choice.place).unwrap_or_default();
         let is_named = before.iter().any(|field| !field.is_empty());
         self.filled += usize::from(is_named);
-        let is_bare = are_bare_noticed && !is_named && (!before.is_empty() || is_apart);
+        let is_bare = are_bare_noticed && !is_named && !before.is_empty();
         let unlike = match (&label, &value) {
             (Some(_), _) if usual.is_odd(&fields, choice.place) => Unlike::Odd,
             (Some(_), _) => Unlike::Value,
@@ -170,7 +229,9 @@ impl SummedRows {
             (None, None) => Unlike::Value,
         };
         let shown = shown(label.as_ref(), &fields, choice.place);
-        Suspect { line, label, value, above: self.velocities.len(), is_apart, unlike, shown }
+        let has_word = usual.has_word_for_number(&fields, choice.place);
+        let above = self.velocities.len();
+        Suspect { line, label, value, above, is_apart, unlike, has_word, shown }
     }
 
     /// Takes a row as a measurement, and returns it then, or as one that may sum up others.
@@ -204,20 +265,19 @@ impl SummedRows {
         let is_odd = || usual.is_odd(fields, choice.place);
         let is_label = |field: &String| SummaryLabel::recognize(field).is_some();
         let rounding = value.rounding(choice.unit) + self.rounding;
-        let value = value.velocity(choice.unit);
-        let is_mean = |sum: f64, count: usize| {
-            count >= MEAN_OF_MIN && (value - sum / count as f64).abs() <= rounding * 1.000_001
-        };
-        let is_mean =
-            is_mean(self.sum, self.velocities.len()) || is_mean(self.last_sum, self.last_count);
-        match is_mean && (is_apart || is_odd() || fields.iter().any(is_label)) {
-            true => Unlike::Odd,
-            false
-                if (self.is_after_suspect() || usual.has_word(fields, choice.place))
-                    && is_odd() =>
-            {
-                Unlike::Edge
-            }
+        let velocity = value.velocity(choice.unit);
+        let mut means =
+            [self.all, self.recent].into_iter().filter(|of| of.have_mean(velocity, rounding));
+        let is_labelled = fields.iter().any(is_label);
+        let is_certain = is_labelled || usual.has_gap(fields, choice.place);
+        let is_mean = means.any(|of| is_certain || of.are_told_apart(rounding));
+        let is_apart = is_apart && fields.len() > 1;
+        let is_fine = fields.len() == 1 && value.has_more_decimals(self.rounding, choice.unit);
+        if is_mean && (is_apart || is_fine || is_odd() || is_labelled) {
+            return Unlike::Odd;
+        }
+        match usual.has_word(fields, choice.place) || self.is_after_suspect() && is_odd() {
+            true => Unlike::Edge,
             false => Unlike::Value,
         }
     }
@@ -238,18 +298,78 @@ impl SummedRows {
             self.edge.push(suspect);
             return;
         }
-        (self.last_sum, self.last_count) = (0.0, 0);
+        self.recent = RunningMoments::default();
         self.suspects.append(&mut self.edge);
         self.suspects.push(suspect);
     }
 
-    /// Takes rows with words for measurements, as others follow; but none that is the mean of those above.
+    /// Takes rows with words for measurements, as others follow.
     fn flush_edge(&mut self, choice: &ColumnChoice) {
         for suspect in std::mem::take(&mut self.edge) {
             if let Some(value) = &suspect.value {
                 self.add(value, choice);
             }
+            if suspect.has_word && self.different_words.len() <= WORDS_MAX {
+                self.different_words.insert(suspect.shown.clone());
+                self.words.push(suspect);
+            }
         }
+    }
+
+    /// Asks what rows are that have the same few words where all others have numbers.
+    fn ask_of_words(&self) -> Result<(), LocatedProblem> {
+        match self.words.first() {
+            Some(first) if self.different_words.len() <= WORDS_MAX => {
+                let word = first.shown.trim_matches('"').to_owned();
+                let found = first.value.as_ref().map_or("", CellNumber::text);
+                let found = shortened(found);
+                Err((Some(first.line), Problem::OtherRow { word, found }))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Keeps the rows behind the last gap, as long as these are few.
+    fn note_gap(&mut self, row: &Suspect) {
+        if row.is_apart {
+            self.tail.clear();
+            self.above_gap = self.velocities.len();
+        }
+        if row.is_apart || (1..=TAIL_MAX).contains(&self.tail.len()) {
+            self.tail.push(row.clone());
+        }
+    }
+
+    /// Notices rows behind a gap at the end of a table of one column, if all are statistics of those above it.
+    fn suspect_tail(&mut self, choice: &ColumnChoice) -> bool {
+        let of_tail = self.velocities.get(self.above_gap..).unwrap_or_default();
+        let is_one = |row: &Suspect| row.unlike == Unlike::Value && row.label.is_none();
+        if of_tail.len() != self.tail.len()
+            || self.tail.len() > TAIL_MAX
+            || !self.tail.iter().all(is_one)
+        {
+            return false;
+        }
+        let all = Statistics::from_velocities(&self.velocities[..self.above_gap]);
+        let Some(all) = all.filter(|_| self.above_gap >= TAIL_OF_MIN) else { return false };
+        let is_statistic = |row: &Suspect| {
+            row.value.as_ref().is_some_and(|value| {
+                let rounding = value.rounding(choice.unit) + self.rounding;
+                let is = |statistic| all.is(statistic, value.velocity(choice.unit), rounding);
+                (is(Statistic::Mean) || is(Statistic::Median))
+                    && rounding < TELLING * all.value(Statistic::Deviation)
+                    || self.tail.len() > 1 && OF_TAIL.into_iter().any(is)
+            })
+        };
+        if self.tail.is_empty() || !self.tail.iter().all(is_statistic) {
+            return false;
+        }
+        self.velocities.truncate(self.above_gap);
+        for mut row in std::mem::take(&mut self.tail) {
+            (row.above, row.unlike) = (self.above_gap, Unlike::Odd);
+            self.suspects.push(row);
+        }
+        true
     }
 
     /// Notices the last row, if it has the value of the mean or median of all above.
@@ -275,8 +395,8 @@ impl SummedRows {
     fn add(&mut self, value: &CellNumber, choice: &ColumnChoice) {
         let velocity = value.velocity(choice.unit);
         self.velocities.push(velocity);
-        self.sum += velocity;
-        (self.last_sum, self.last_count) = (self.last_sum + velocity, self.last_count + 1);
+        self.all.add(velocity);
+        self.recent.add(velocity);
         // Zeros at the end may have been left away.
         self.rounding = self.rounding.min(value.rounding(choice.unit));
     }

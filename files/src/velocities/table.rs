@@ -12,6 +12,7 @@ use super::lines::{TableLine, TableLines};
 use super::number::CellNumber;
 use super::opening;
 use super::problem::{COLUMN, LocatedProblem, Problem, listed, shortened};
+use super::row_kinds;
 use super::summaries::{self, Summaries};
 use super::units::NamedUnit;
 
@@ -23,6 +24,8 @@ pub(crate) struct VelocityTable {
     pub(super) choice: ColumnChoice,
     /// Rows that sum up others.
     pub(super) summaries: Summaries,
+    /// What the user should know of another column.
+    pub(super) note: Option<String>,
 }
 
 impl VelocityTable {
@@ -87,7 +90,9 @@ impl VelocityTable {
             }
         };
         let summaries = summaries::of_table(&content.text, &header, &choice)?;
-        Ok(Self { content, header, choice, summaries })
+        let (text, is_found_out) = (&content.text, format.is_found_out);
+        let note = row_kinds::check(text, &header, &choice, &summaries, is_found_out)?;
+        Ok(Self { content, header, choice, summaries, note })
     }
 
     /// Returns where it comes from, for a message.
