@@ -17,7 +17,7 @@
 //! let mut client = Client::connect(&remote, Arc::new(Silent)).await?;
 //! let id = client.submit(&job, &RequestId::new()?, SubmitOptions::default()).await?;
 //! client.watch(&id, |_| Ok::<_, ClientError>(())).await?;
-//! println!("{}", client.fetch(&id).await?.result.digest);
+//! println!("{}", client.fetch(&id).await?.result.digest());
 //! # Ok(())
 //! # }
 //! ```
