@@ -1,9 +1,7 @@
 //! The results of an ended job, as a coordinator sends them.
 
 use osteon_common::job::JobSpecification;
-use osteon_common::outcome::Outcome;
-use osteon_common::posterior::PosteriorDraw;
-use osteon_common::results::{Evaluation, Status};
+use osteon_common::results::{Evaluation, SetSamples, Status};
 use osteon_files::report::ResultFile;
 
 /// Specification, result and history of an ended job.
@@ -21,14 +19,4 @@ pub struct Fetched {
     pub history: Vec<Evaluation>,
     /// The samples of each set of data: one, or one for each group.
     pub samples: Vec<SetSamples>,
-}
-
-/// What was sampled for one set of data.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SetSamples {
-    /// Outcomes at its best point; empty if there is none, and for groups whose outcomes together with those
-    /// before exceed the number that one evaluation may have.
-    pub outcomes: Vec<Outcome>,
-    /// Draws from its posterior.
-    pub draws: Vec<PosteriorDraw>,
 }

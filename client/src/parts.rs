@@ -4,7 +4,7 @@ use osteon_common::job::DRAWS_MAX;
 use osteon_common::limits::{DRAWS_ALL_MAX, GROUPS_MAX, REALIZATIONS_MAX};
 use osteon_common::outcome::Outcome;
 use osteon_common::posterior::PosteriorDraw;
-use osteon_common::results::Evaluation;
+use osteon_common::results::{Evaluation, SetSamples};
 use osteon_files::report::{Group, PosteriorReport, ReadError, ResultFile};
 use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::malformed::Malformed;
@@ -12,7 +12,7 @@ use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::{self, DrawBlock, RealizationBlock};
 use osteon_proto::{draws, history, realizations, specification};
 
-use crate::fetched::{Fetched, SetSamples};
+use crate::fetched::Fetched;
 
 /// The parts received so far.
 #[derive(Debug, Default)]
@@ -130,7 +130,7 @@ impl FetchedParts {
             specification::from_message(&specification).map_err(Malformed::InvalidSpecification)?;
         let message = self.result.ok_or(Malformed::Missing { field: "result" })?;
         let status = JOB_STATUS.required(message.status, "status")?;
-        let mut result = ResultFile::from_json(&message.json).map_err(no_result)?;
+        let mut result = ResultFile::from_json(&message.json).map_err(malformed_result)?;
         if result.kind() != specification.kind {
             let (found, kind) = (result.kind().name(), specification.kind.name());
             let reason = format!("it is the result of a {found}, and the job is a {kind}");
@@ -139,14 +139,14 @@ impl FetchedParts {
         let all = result.realizations();
         let of_job = SetSamples {
             outcomes: self.realizations.assemble(result.best_point(None).is_ok(), all)?,
-            draws: drawn(self.draws, result.posterior())?,
+            draws: check_draws(self.draws, result.posterior())?,
         };
         let (mut groups, mut samples) = (Vec::new(), Vec::new());
         for FetchedGroup { message, realizations, draws } in self.groups {
-            let group = Group::from_json(&message.json).map_err(no_result)?;
+            let group = Group::from_json(&message.json).map_err(malformed_result)?;
             samples.push(SetSamples {
                 outcomes: realizations.assemble(group.best_point().is_some(), all)?,
-                draws: drawn(draws, group.posterior.as_ref())?,
+                draws: check_draws(draws, group.posterior.as_ref())?,
             });
             groups.push(group);
         }
@@ -170,7 +170,7 @@ impl PointOutcomes {
 }
 
 /// Returns the draws, of which there must be as many as the posterior says.
-fn drawn(
+fn check_draws(
     draws: Vec<PosteriorDraw>,
     posterior: Option<&PosteriorReport>,
 ) -> Result<Vec<PosteriorDraw>, Malformed> {
@@ -187,7 +187,7 @@ fn require_length(field: &'static str, found: u64, expected: u64) -> Result<(), 
     Err(Malformed::WrongLength { field, found, expected })
 }
 
-fn no_result(error: ReadError) -> Malformed {
+fn malformed_result(error: ReadError) -> Malformed {
     Malformed::Json { field: "json", reason: error.to_string() }
 }
 

@@ -8,6 +8,7 @@ use crate::job::{Objective, Sampling, Search};
 use crate::moments::{KolmogorovTest, MomentIntervals, Outlier};
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
+use crate::posterior::PosteriorDraw;
 use crate::sampling::NominalSampling;
 use crate::settings::{Picking, SolverSettings};
 use crate::version::Program;
@@ -336,4 +337,24 @@ pub struct BestPoint {
     pub estimated_error: Option<EstimatedError>,
     /// Outcomes in index order.
     pub outcomes: Vec<Outcome>,
+}
+
+/// The samples of one set of data, which are sent in blocks beside its result.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SetSamples {
+    /// Outcomes at its best point; empty if there is none, and for groups whose outcomes together with those
+    /// before exceed the number that one evaluation may have.
+    pub outcomes: Vec<Outcome>,
+    /// Draws from its posterior.
+    pub draws: Vec<PosteriorDraw>,
+}
+
+impl SetSamples {
+    /// Takes them from the result for a set of data.
+    pub fn new(best: Option<BestPoint>, conclusions: Conclusions) -> Self {
+        Self {
+            outcomes: best.map(|best| best.outcomes).unwrap_or_default(),
+            draws: conclusions.posterior.map(|posterior| posterior.draws).unwrap_or_default(),
+        }
+    }
 }

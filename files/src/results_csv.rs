@@ -118,7 +118,7 @@ pub fn groups(
             |name: Parameter| number(known.get(name).or_else(|| best.map(|point| point.get(name))));
         fields.extend(specification.parameters_given().map(of_best));
         fields.extend(free.iter().flat_map(|&name| identified(name, group)));
-        fields.extend(measured(group));
+        fields.extend(data_fields(group));
         let failed = group.failures.values().copied().fold(0, u64::saturating_add);
         fields.push(best.map_or_else(String::new, |_| failed.to_string()));
         let of_group = |row: &&Evaluation| row.role.group as usize == set;
@@ -165,7 +165,7 @@ fn identified(name: Parameter, group: &Group) -> [String; 3] {
 
 /// Returns the moments of a group's data with their intervals, and the test against the model's
 /// law.
-fn measured(group: &Group) -> [String; 8] {
+fn data_fields(group: &Group) -> [String; 8] {
     let Moments { mean, coefficient_of_variation } = group.data.moments;
     let intervals = group.data.intervals();
     let [mean_lower, mean_upper] = ends(intervals.map(|found| found.mean));

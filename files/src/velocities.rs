@@ -30,6 +30,7 @@ mod opening;
 mod problem;
 mod row_kinds;
 mod row_names;
+mod running_moments;
 mod shapes;
 mod statistics;
 mod summaries;

@@ -1,9 +1,8 @@
 use osteon_common::job::PosteriorSettings;
-use osteon_common::results::JobFailure;
+use osteon_common::results::{JobFailure, SetSamples};
 use serde_json::json;
 
 use super::*;
-use crate::fetched::SetSamples;
 use crate::listener::Silent;
 use crate::sample_result::{drawn_posterior, identification};
 

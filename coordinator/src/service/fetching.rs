@@ -6,12 +6,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures::{Stream, StreamExt as _, stream};
-use osteon_common::conclusions::Conclusions;
 use osteon_common::limits::{FETCH_SECONDS_MAX, READER_STALL_SECONDS_MAX};
-use osteon_common::outcome::Outcome;
 use osteon_common::outcomes::Outcomes;
-use osteon_common::posterior::PosteriorDraw;
-use osteon_common::results::{BestPoint, Integrity, JobResult};
+use osteon_common::results::{Integrity, JobResult, SetSamples};
 use osteon_files::report::{Group, ResultFile};
 use osteon_proto::choice::JOB_STATUS;
 use osteon_proto::v1::fetch_response::Part;
@@ -98,7 +95,7 @@ pub(crate) async fn send_all(
             reason: result.reason.clone(),
             json: ResultFile::from_job(left.specification.kind, &result).to_json(),
         };
-        (message, SampledSet::new(result.best, result.conclusions))
+        (message, SetSamples::new(result.best, result.conclusions))
     })
     .await?;
     reader.send(Part::Result(message)).await?;
@@ -114,7 +111,7 @@ pub(crate) async fn send_all(
             let found = left.group(set, read)?;
             let json = Group::new(left.specification.objective, &found).to_json();
             let message = v1::GroupResult { group: number, json };
-            Some((message, SampledSet::new(found.best, found.conclusions)))
+            Some((message, SetSamples::new(found.best, found.conclusions)))
         });
         let Some((message, samples)) = found.await? else { continue };
         reader.send(Part::Group(message)).await?;
@@ -140,27 +137,10 @@ async fn computed<T: Send + 'static>(
     reader.kept_waiting(async { computing.await.map_err(failed) }).await
 }
 
-/// What was sampled for a set of data.
-struct SampledSet {
-    /// Outcomes at its best point.
-    outcomes: Vec<Outcome>,
-    /// Draws from its posterior.
-    draws: Vec<PosteriorDraw>,
-}
-
-impl SampledSet {
-    fn new(best: Option<BestPoint>, conclusions: Conclusions) -> Self {
-        Self {
-            outcomes: best.map(|best| best.outcomes).unwrap_or_default(),
-            draws: conclusions.posterior.map(|posterior| posterior.draws).unwrap_or_default(),
-        }
-    }
-}
-
 /// Sends the realizations at the best point of a set of data, then the draws from its posterior.
 async fn send_samples(
     group: Option<u32>,
-    samples: &SampledSet,
+    samples: &SetSamples,
     reader: &FetchStream,
 ) -> Result<(), StreamEnd> {
     for (block, outcomes) in samples.outcomes.chunks(REALIZATION_BLOCK).enumerate() {
@@ -284,6 +264,7 @@ mod tests {
 
     use futures::FutureExt as _;
     use osteon_common::parameters::Point;
+    use osteon_common::posterior::PosteriorDraw;
     use prost::Message as _;
     use tokio::sync::{OwnedSemaphorePermit, Semaphore};
     use tokio::time::advance;
@@ -421,7 +402,7 @@ mod tests {
             mean: 3900.0,
             coefficient_of_variation: 0.03,
         };
-        let samples = SampledSet { outcomes: vec![Ok(3900.0)], draws: vec![draw; DRAW_BLOCK + 1] };
+        let samples = SetSamples { outcomes: vec![Ok(3900.0)], draws: vec![draw; DRAW_BLOCK + 1] };
         let stream =
             paced((), |reader| async move { send_samples(Some(3), &samples, &reader).await });
         let parts: Vec<_> = stream.map(|part| part.unwrap().part.unwrap()).collect().await;

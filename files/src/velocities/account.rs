@@ -27,7 +27,7 @@ pub(crate) struct Account {
     pub(super) missing: u32,
     /// Number of lines below the header that are comments.
     pub(super) comments: usize,
-    /// What the user should know of another column.
+    /// A sentence for the user about a column that is not read.
     note: Option<String>,
     /// Two groups whose names hardly differ.
     pub(super) alike: Option<[String; 2]>,

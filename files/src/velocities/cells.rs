@@ -39,7 +39,7 @@ pub(super) struct Cells {
     only: [Option<usize>; 2],
     /// Numbers that may stand for none.
     pub(super) marks: BTreeMap<String, CellMark>,
-    /// What is no number.
+    /// Cells that are not numbers, and where they stand.
     pub(super) texts: BTreeMap<String, Text>,
     /// The last text, if it may be one of the names of another table.
     name: Option<String>,

@@ -21,7 +21,7 @@ pub(super) struct ColumnChoice {
 
 impl ColumnChoice {
     /// Returns the column that the keys name, read as they say.
-    pub(super) fn given(format: &CsvFormat, place: usize) -> Self {
+    pub(super) fn from_keys(format: &CsvFormat, place: usize) -> Self {
         Self {
             place,
             decimal: format.decimal.unwrap_or_default(),

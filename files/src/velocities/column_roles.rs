@@ -1,4 +1,4 @@
-//! What columns of names seem to be, by their own names.
+//! Whether a column seems to hold subjects or groups, judged by its name.
 
 /// Names of columns that seem to name the subject of each velocity.
 const LIKE_SUBJECTS: [&str; 7] =

@@ -209,7 +209,7 @@ pub(super) const OTHER_THINGS: [&str; 25] = [
     "centrifugation",
     "rotation",
 ];
-/// What else may stand beside a symbol, or in brackets behind a name, without being a unit.
+/// Words that say how a velocity was measured, beside a symbol or in brackets behind a name; none is a unit.
 pub(super) const REMARKS: [&str; 53] = [
     "l",
     "r",

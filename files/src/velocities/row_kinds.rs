@@ -10,6 +10,7 @@ use super::header::Header;
 use super::lines::{TableLine, TableLines};
 use super::number::CellNumber;
 use super::problem::{LocatedProblem, Problem, shortened};
+use super::running_moments::RunningMoments;
 use super::summaries::Summaries;
 
 /// Most columns that are looked at, and most different cells of one.
@@ -88,7 +89,7 @@ pub(super) fn check(
             refuse_different_things(name, cells)?;
         }
     }
-    Ok(seen.state(header))
+    Ok(seen.state_note(header))
 }
 
 /// Returns whether a column is that of groups or subjects, which the job may identify each by itself.
@@ -100,9 +101,7 @@ fn is_role(name: &str) -> bool {
 /// The rows with one cell in a column.
 #[derive(Debug, Clone, Copy)]
 struct CellRows {
-    count: usize,
-    sum: f64,
-    squares: f64,
+    moments: RunningMoments,
     first: (usize, f64),
     last: (usize, f64),
 }
@@ -112,7 +111,8 @@ struct SeenColumns {
     /// For each column the rows with each of its cells; empty if there are too many of them.
     cells: Vec<BTreeMap<String, CellRows>>,
     is_full: Vec<bool>,
-    /// For each column the number of rows in which it has a number like a velocity.
+    is_nameless: Vec<bool>,
+    /// For each column without a name the number of rows in which it has a number like the velocity.
     like_velocities: Vec<usize>,
     rows: usize,
     /// By how much velocities are rounded, m/s.
@@ -127,6 +127,7 @@ impl SeenColumns {
         let mut columns = Self {
             cells: vec![BTreeMap::new(); count],
             is_full: vec![false; count],
+            is_nameless: header.names.iter().take(count).map(String::is_empty).collect(),
             like_velocities: vec![0; count],
             rows: 0,
             rounding: f64::INFINITY,
@@ -154,25 +155,23 @@ impl SeenColumns {
             self.numbers.entry(cell).or_insert((line, velocity, 0)).2 += 1;
         }
         for (place, field) in fields.iter().enumerate().take(self.cells.len()) {
-            let other = CellNumber::read(field, choice.decimal);
-            let is_like = other.is_some_and(|other| {
-                (velocity / APART..velocity * APART).contains(&other.velocity(choice.unit))
-            });
-            self.like_velocities[place] += usize::from(is_like && place != choice.place);
+            // Reading a number takes long, and is needed for columns without a name only.
+            if self.is_nameless[place] && place != choice.place {
+                let other = CellNumber::read(field, choice.decimal);
+                let is_like = other.is_some_and(|other| {
+                    (velocity / APART..velocity * APART).contains(&other.velocity(choice.unit))
+                });
+                self.like_velocities[place] += usize::from(is_like);
+            }
             let cells = &mut self.cells[place];
-            if field.is_empty() || self.is_full[place] {
+            if field.is_empty() || self.is_full[place] || place == choice.place {
                 continue;
             }
-            let rows = cells.entry(field.clone()).or_insert(CellRows {
-                count: 0,
-                sum: 0.0,
-                squares: 0.0,
-                first: (line, velocity),
-                last: (line, velocity),
-            });
-            rows.count += 1;
-            rows.sum += velocity;
-            rows.squares += velocity * velocity;
+            if !cells.contains_key(field) {
+                cells.insert(field.clone(), CellRows::begin(line, velocity));
+            }
+            let Some(rows) = cells.get_mut(field) else { continue };
+            rows.moments.add(velocity);
             rows.last = (line, velocity);
             if cells.len() > CELLS_MAX {
                 cells.clear();
@@ -184,8 +183,7 @@ impl SeenColumns {
     /// Asks of a column without a name that has numbers like the velocities.
     fn refuse_nameless(&self, header: &Header, place: usize) -> Result<(), LocatedProblem> {
         let is_like = |at: &usize| {
-            header.names[*at].is_empty()
-                && self.like_velocities[*at] as f64 >= NAMELESS * self.rows as f64
+            self.is_nameless[*at] && self.like_velocities[*at] as f64 >= NAMELESS * self.rows as f64
         };
         match (0..self.cells.len()).find(is_like).filter(|_| self.rows > 1) {
             Some(at) => {
@@ -236,10 +234,10 @@ impl SeenColumns {
     }
 
     /// Says that a column which tells whether rows count is not read.
-    fn state(&self, header: &Header) -> Option<String> {
+    fn state_note(&self, header: &Header) -> Option<String> {
         let is_state = |(place, name): (usize, &String)| {
             let cells = self.cells.get(place)?;
-            let filled: usize = cells.values().map(|rows| rows.count).sum();
+            let filled: usize = cells.values().map(|rows| rows.moments.count()).sum();
             let differ = cells.len() > 1 || !cells.is_empty() && filled < self.rows;
             let is_named = STATES.contains(&name.to_lowercase().as_str());
             let has_other = cells.keys().any(|cell| OTHERS.contains(&cell.to_lowercase().as_str()));
@@ -261,7 +259,7 @@ fn refuse_means(
     cells: &BTreeMap<String, CellRows>,
     rounding: f64,
 ) -> Result<(), LocatedProblem> {
-    let groups = || cells.values().filter(|rows| rows.count >= GROUP_MIN);
+    let groups = || cells.values().filter(|rows| rows.moments.count() >= GROUP_MIN);
     if groups().count() < GROUPS_MIN {
         return Ok(());
     }
@@ -280,25 +278,19 @@ fn refuse_means(
 }
 
 impl CellRows {
-    fn mean(&self) -> f64 {
-        self.sum / self.count as f64
-    }
-
-    /// Returns the standard deviation without one of the velocities.
-    fn deviation_without(&self, one: f64) -> f64 {
-        let count = self.count as f64 - 1.0;
-        let mean = (self.sum - one) / count;
-        ((self.squares - one * one - count * mean * mean) / (count - 1.0)).max(0.0).sqrt()
+    fn begin(line: usize, velocity: f64) -> Self {
+        let place = (line, velocity);
+        Self { moments: RunningMoments::default(), first: place, last: place }
     }
 
     /// Returns how probable it is that one of the velocities is the mean of the others by chance; infinite where
     /// it is not their mean.
     fn chance_of_mean(&self, one: f64, rounding: f64) -> f64 {
-        let mean = (self.sum - one) / (self.count as f64 - 1.0);
+        let others = self.moments.without(one);
         // Both the value and the mean are rounded.
         let within = 2.0 * rounding * 1.000_001;
-        match (one - mean).abs() <= within {
-            true => (2.0 * within / (SCATTER * self.deviation_without(one))).min(1.0),
+        match (one - others.mean()).abs() <= within {
+            true => (2.0 * within / (SCATTER * others.deviation())).min(1.0),
             false => f64::INFINITY,
         }
     }
@@ -311,25 +303,28 @@ fn refuse_different_things(
 ) -> Result<(), LocatedProblem> {
     let are_kinds = (2..=KINDS_MAX).contains(&cells.len());
     let is_word = |cell: &String| cell.starts_with(char::is_alphabetic);
-    if !are_kinds || !cells.keys().all(is_word) || cells.values().any(|rows| rows.count < 2) {
+    if !are_kinds
+        || !cells.keys().all(is_word)
+        || cells.values().any(|rows| rows.moments.count() < 2)
+    {
         return Ok(());
     }
     let by_mean = |one: &(&String, &CellRows), other: &(&String, &CellRows)| {
-        one.1.mean().total_cmp(&other.1.mean())
+        one.1.moments.mean().total_cmp(&other.1.moments.mean())
     };
     let (Some(low), Some(high)) = (cells.iter().min_by(by_mean), cells.iter().max_by(by_mean))
     else {
         return Ok(());
     };
-    if high.1.mean() < APART * low.1.mean() {
+    if high.1.moments.mean() < APART * low.1.moments.mean() {
         return Ok(());
     }
     let problem = Problem::DifferentThings {
         column: shortened(name),
         first: shortened(high.0),
-        first_mean: high.1.mean(),
+        first_mean: high.1.moments.mean(),
         second: shortened(low.0),
-        second_mean: low.1.mean(),
+        second_mean: low.1.moments.mean(),
     };
     Err((Some(low.1.first.0), problem))
 }

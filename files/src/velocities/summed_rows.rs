@@ -9,6 +9,7 @@ use super::header::Header;
 use super::lines::{TableLine, TableLines};
 use super::number::CellNumber;
 use super::problem::{LocatedProblem, Problem, shortened};
+use super::running_moments::RunningMoments;
 use super::shapes::UsualShape;
 use super::statistics::{Statistic, Statistics, SummaryLabel};
 
@@ -57,42 +58,12 @@ pub(super) struct SummedRows {
     recent: RunningMoments,
     /// Rows at the end of the table, so far, that have words where others have numbers.
     edge: Vec<Suspect>,
-    /// Such rows that others follow, with their words, as long as these are few.
-    words: Vec<Suspect>,
+    /// The first of such rows that others follow, and the different words of all, as long as these are few.
+    first_word: Option<Suspect>,
     different_words: BTreeSet<String>,
     /// The rows behind the last gap, and the number of velocities above it.
     tail: Vec<Suspect>,
     above_gap: usize,
-}
-
-/// Number, sum and sum of the squares of velocities.
-#[derive(Debug, Clone, Copy, Default)]
-struct RunningMoments {
-    count: usize,
-    sum: f64,
-    squares: f64,
-}
-
-impl RunningMoments {
-    fn add(&mut self, velocity: f64) {
-        self.count += 1;
-        self.sum += velocity;
-        self.squares += velocity * velocity;
-    }
-
-    /// Returns whether a value is their mean.
-    fn have_mean(&self, value: f64, rounding: f64) -> bool {
-        self.count >= MEAN_OF_MIN
-            && (value - self.sum / self.count as f64).abs() <= rounding * 1.000_001
-    }
-
-    /// Returns whether numbers that are rounded so are fine enough to tell their mean from other values.
-    fn are_told_apart(&self, rounding: f64) -> bool {
-        let count = self.count as f64;
-        let mean = self.sum / count;
-        let variance = (self.squares - count * mean * mean) / (count - 1.0);
-        rounding < TELLING * variance.max(0.0).sqrt()
-    }
 }
 
 /// A row that may sum up others.
@@ -228,7 +199,7 @@ impl SummedRows {
             (None, Some(value)) => self.unlike(value, &fields, (choice, usual), is_apart),
             (None, None) => Unlike::Value,
         };
-        let shown = shown(label.as_ref(), &fields, choice.place);
+        let shown = name_for_messages(label.as_ref(), &fields, choice.place);
         let has_word = usual.has_word_for_number(&fields, choice.place);
         let above = self.velocities.len();
         Suspect { line, label, value, above, is_apart, unlike, has_word, shown }
@@ -267,10 +238,10 @@ impl SummedRows {
         let rounding = value.rounding(choice.unit) + self.rounding;
         let velocity = value.velocity(choice.unit);
         let mut means =
-            [self.all, self.recent].into_iter().filter(|of| of.have_mean(velocity, rounding));
+            [self.all, self.recent].into_iter().filter(|of| have_mean(of, velocity, rounding));
         let is_labelled = fields.iter().any(is_label);
         let is_certain = is_labelled || usual.has_gap(fields, choice.place);
-        let is_mean = means.any(|of| is_certain || of.are_told_apart(rounding));
+        let is_mean = means.any(|of| is_certain || rounding < TELLING * of.deviation());
         let is_apart = is_apart && fields.len() > 1;
         let is_fine = fields.len() == 1 && value.has_more_decimals(self.rounding, choice.unit);
         if is_mean && (is_apart || is_fine || is_odd() || is_labelled) {
@@ -311,14 +282,14 @@ impl SummedRows {
             }
             if suspect.has_word && self.different_words.len() <= WORDS_MAX {
                 self.different_words.insert(suspect.shown.clone());
-                self.words.push(suspect);
+                self.first_word.get_or_insert(suspect);
             }
         }
     }
 
     /// Asks what rows are that have the same few words where all others have numbers.
     fn ask_of_words(&self) -> Result<(), LocatedProblem> {
-        match self.words.first() {
+        match &self.first_word {
             Some(first) if self.different_words.len() <= WORDS_MAX => {
                 let word = first.shown.trim_matches('"').to_owned();
                 let found = first.value.as_ref().map_or("", CellNumber::text);
@@ -408,6 +379,11 @@ impl SummedRows {
     }
 }
 
+/// Returns whether a value is the mean of some velocities.
+fn have_mean(velocities: &RunningMoments, value: f64, rounding: f64) -> bool {
+    velocities.count() >= MEAN_OF_MIN && (value - velocities.mean()).abs() <= rounding * 1.000_001
+}
+
 impl ReadRow {
     /// Returns the number in the column of velocities, if it does not stand for a missing one.
     fn value(&self, choice: &ColumnChoice) -> Option<CellNumber> {
@@ -428,7 +404,7 @@ impl ReadRow {
 }
 
 /// Returns what stands for a row in a message: its label, or its first name, or its velocity.
-fn shown(label: Option<&SummaryLabel>, fields: &[String], place: usize) -> String {
+fn name_for_messages(label: Option<&SummaryLabel>, fields: &[String], place: usize) -> String {
     let beside =
         || fields.iter().enumerate().filter(|(at, _)| *at != place).map(|(_, field)| field);
     let of_row = beside().find(|field| SummaryLabel::recognize(field).is_some());

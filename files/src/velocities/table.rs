@@ -24,7 +24,7 @@ pub(crate) struct VelocityTable {
     pub(super) choice: ColumnChoice,
     /// Rows that sum up others.
     pub(super) summaries: Summaries,
-    /// What the user should know of another column.
+    /// A sentence for the user about a column that is not read.
     pub(super) note: Option<String>,
 }
 
@@ -84,7 +84,7 @@ impl VelocityTable {
             false => {
                 let at_header = |problem| (Some(header.line).filter(|&line| line > 0), problem);
                 let place = given_place(&header, format).map_err(at_header)?;
-                let choice = ColumnChoice::given(format, place);
+                let choice = ColumnChoice::from_keys(format, place);
                 check_units(&content.text, &header, &choice)?;
                 choice
             }
