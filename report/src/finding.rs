@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use osteon_common::inference::MomentWeights;
 use osteon_common::job::{JobSpecification, Objective, Range};
+use osteon_common::moments::{MOMENTS, ObservableEstimates};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::results::Status;
@@ -37,6 +38,8 @@ pub(crate) struct Finding<'a> {
     pub(crate) dispersion: Option<f64>,
     /// Moments of the model.
     pub(crate) velocity: &'a Velocity,
+    /// Other observables of the model that were measured.
+    pub(crate) observables: ObservableEstimates,
     /// The data.
     pub(crate) data: Option<&'a Data>,
     /// Failed realizations by kind.
@@ -87,6 +90,7 @@ impl<'a> Finding<'a> {
             parameters: &result.parameters,
             dispersion: result.dispersion,
             velocity: &result.velocity,
+            observables: result.observables,
             data: result.data.as_ref(),
             failures: &result.failures,
             identified: result.identified(),
@@ -118,6 +122,7 @@ impl<'a> Finding<'a> {
             parameters: &group.parameters,
             dispersion: group.dispersion,
             velocity: &group.velocity,
+            observables: group.observables,
             data: Some(&group.data),
             failures: &group.failures,
             identified: group.identified.as_ref(),
@@ -145,6 +150,7 @@ impl<'a> Finding<'a> {
             parameters: &result.parameters,
             dispersion: result.dispersion,
             velocity: &result.velocity,
+            observables: ObservableEstimates::default(),
             data: None,
             failures: &result.failures,
             identified: None,
@@ -206,18 +212,18 @@ impl<'a> Finding<'a> {
     /// a cost that does not depend on the moments alone.
     pub(crate) fn noise_level(&self) -> Option<f64> {
         let specification = self.specification();
-        if !specification.objective.is_of_moments()
-            || specification.has_priors()
-            || specification.has_decays()
-        {
+        if !specification.objective.is_of_moments() || specification.has_priors() {
             return None;
         }
         let (moments, errors) = (&self.velocity.moments, &self.velocity.standard_error);
-        let relative = [
-            errors.mean? / moments.mean?,
-            errors.coefficient_of_variation? / moments.coefficient_of_variation?,
-        ];
         let data = specification.data.as_ref();
+        let means = data.map(|data| data.compared(self.set).observables).unwrap_or_default();
+        let mut relative = [0.0; MOMENTS];
+        relative[0] = errors.mean? / moments.mean?;
+        relative[1] = errors.coefficient_of_variation? / moments.coefficient_of_variation?;
+        for (observable, found) in self.observables.present() {
+            relative[2 + observable as usize] = found.standard_error / means[observable]?;
+        }
         let weights = data
             .filter(|_| specification.objective == Objective::ChiSquare)
             .and_then(|data| MomentWeights::of_data(data, self.set));

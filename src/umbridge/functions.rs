@@ -33,7 +33,8 @@ pub(crate) struct ServedJob {
     specification: Arc<JobSpecification>,
     evaluator: Evaluator,
     cases: CaseSolver,
-    /// The search of the job, for the cost of points; `None` without data, and with groups or decays.
+    /// The search of the job, for the cost of points; `None` without data, and with groups or other
+    /// observables.
     search: Option<Search>,
     has_posterior: bool,
     densities: Mutex<BTreeMap<(usize, u64, u64), KeptDensity>>,
@@ -53,12 +54,14 @@ impl ServedJob {
     pub(crate) fn new(specification: JobSpecification, evaluator: Evaluator, isa: Isa) -> Self {
         let specification = Arc::new(specification);
         let data = specification.data.as_ref();
-        let has_cost = data.is_some_and(|data| !data.is_grouped() && !data.has_decays());
+        let velocities_only = specification.observables().is_empty();
+        let has_cost = data.is_some_and(|data| !data.is_grouped() && velocities_only);
         let search = (has_cost && specification.is_searched())
             .then(|| Search::new(Arc::clone(&specification)));
         let mut sets = 0..data.map_or(0, |data| data.sets());
         let has_posterior = specification.kind == JobKind::Identification
             && specification.free().next().is_some()
+            && velocities_only
             && sets.any(|set| PosteriorDensity::new(&specification, set).is_some());
         let cases = CaseSolver::new(isa);
         let densities = Mutex::default();
@@ -146,7 +149,7 @@ impl ServedJob {
                 };
                 density.log_prior(&point).ok_or_else(outside)?;
                 let result = self.evaluated(&space, &point, config).await?;
-                let log = density.log_density(&point, result.velocity.moments);
+                let log = density.log_density(&point, &result.velocity.moments.into());
                 let output = vec![log.ok_or_else(outside)?];
                 Ok(ModelValue { output, notes: self.notes(&point, result) })
             }

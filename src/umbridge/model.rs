@@ -46,7 +46,7 @@ impl ServedModel {
         match Self::ALL.into_iter().find(|model| model.name() == name) {
             Some(Self::Posterior) if !has_posterior => Err(not_found(
                 "this job has no model \"posterior\": that needs [data] whose noise is known \
-                 (velocities, or moments with their count), without decays, and a free parameter"
+                 (velocities, or moments with their count), without other observables, and a free parameter"
                     .to_owned(),
             )),
             Some(model) => Ok(model),

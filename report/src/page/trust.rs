@@ -202,7 +202,7 @@ fn determined(finding: &Finding<'_>) -> Option<Verdict> {
         if finding.posterior.is_some() {
             " The posterior says how far they may lie."
         } else {
-            " Fix parameters, add decays, or ask for a posterior."
+            " Fix parameters, add other observables, or ask for a posterior."
         }
     );
     Some(verdict(Bearing::Caution, "Parameters", words))
