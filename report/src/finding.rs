@@ -185,21 +185,10 @@ impl<'a> Finding<'a> {
 
     /// Returns the value of a parameter at the best point, and where it is in the result.
     pub(crate) fn value(&self, parameter: Parameter) -> (Option<f64>, String) {
-        let model = self.parameters;
-        let value = match parameter {
-            Parameter::Dispersion => {
-                return (self.dispersion, format!("{}/dispersion", self.place));
-            }
-            Parameter::Density => model.density,
-            Parameter::LongitudinalYoungModulus => model.longitudinal_young_modulus,
-            Parameter::LongitudinalPoissonRatio => model.longitudinal_poisson_ratio,
-            Parameter::LongitudinalShearModulus => model.longitudinal_shear_modulus,
-            Parameter::TransverseYoungModulus => model.transverse_young_modulus,
-            Parameter::TransversePoissonRatio => model.transverse_poisson_ratio,
-            Parameter::BoneThickness => model.bone_thickness,
-            Parameter::BoneQualityFactor => model.bone_quality_factor,
-            Parameter::CouplingSoundSpeed => model.coupling_sound_speed,
-        };
+        if parameter == Parameter::Dispersion {
+            return (self.dispersion, format!("{}/dispersion", self.place));
+        }
+        let value = self.parameters.get(parameter);
         (value, format!("{}/parameters/{}", self.place, parameter.name()))
     }
 

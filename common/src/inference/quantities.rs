@@ -10,7 +10,7 @@ use crate::data_statistics::{FewIntervals, intervals_of_data};
 use crate::ensemble::DISPERSION_MAX;
 use crate::job::{Data, JobSpecification, Range};
 use crate::moments::{ConfidenceInterval, MOMENTS, MomentMatrix, MomentVector};
-use crate::parameters::{Parameter, Point};
+use crate::parameters::{Parameter, Point, Scale};
 use crate::results::BestPoint;
 
 /// How far the logarithm of a mean velocity may be off the closed form, ln √(c1111/ρ), between two
@@ -87,21 +87,11 @@ impl Quantities<'_> {
             let value = self.best.point.get(parameter);
             let quantity = match parameter {
                 Parameter::Dispersion => self.dispersion(free),
-                Parameter::LongitudinalPoissonRatio | Parameter::TransversePoissonRatio => {
-                    self.poisson_ratio(parameter, free)
-                }
+                _ if parameter.row().scale == Scale::Linear => self.poisson_ratio(parameter, free),
                 _ if self.may_have_second_value(parameter) => {
                     DerivedQuantity { value, known: None }
                 }
-                Parameter::Density
-                | Parameter::LongitudinalYoungModulus
-                | Parameter::LongitudinalShearModulus
-                | Parameter::TransverseYoungModulus
-                | Parameter::BoneThickness
-                | Parameter::BoneQualityFactor
-                | Parameter::CouplingSoundSpeed => {
-                    self.of_logarithm(value, &self.along(parameter, free, 1.0 / value))
-                }
+                _ => self.of_logarithm(value, &self.along(parameter, free, 1.0 / value)),
             };
             (parameter, quantity)
         };

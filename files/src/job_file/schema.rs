@@ -95,7 +95,11 @@ fn number(default: Option<f64>, accepted: Interval) -> Json {
     number
 }
 
-fn described(mut schema: Json, Key { meaning, .. }: Key) -> Json {
+fn described(schema: Json, Key { meaning, .. }: Key) -> Json {
+    said_to_be(schema, meaning)
+}
+
+fn said_to_be(mut schema: Json, meaning: &str) -> Json {
     schema["description"] = plain(meaning).into();
     schema
 }
@@ -188,7 +192,7 @@ fn ranges() -> Json {
 }
 
 fn range(parameter: Parameter) -> Json {
-    let value = || number(None, Interval::accepted_for(parameter));
+    let value = || number(None, parameter.row().accepted);
     let bounds = json!({ "type": "array", "items": value(), "minItems": 2, "maxItems": 2 });
     let [start, bounds, fixed] = {
         let [start_key, bounds_key, fixed_key] = parameters::KEYS;
@@ -209,18 +213,18 @@ fn range(parameter: Parameter) -> Json {
         range["oneOf"] = required.to_vec().into();
         range
     };
-    described(range, Key { name: parameter.name(), meaning: meaning(parameter) })
+    said_to_be(range, &meaning(parameter))
 }
 
 fn prior(parameter: Parameter) -> Json {
     let [value, weight] = priors::KEYS;
     let properties = json!({
-        value.name: described(number(None, Interval::accepted_for(parameter)), value),
+        value.name: described(number(None, parameter.row().accepted), value),
         weight.name: described(number(None, Interval::above(0.0, "")), weight),
     });
     let mut prior = object(properties);
     prior["required"] = json!([value.name, weight.name]);
-    described(prior, Key { name: parameter.name(), meaning: meaning(parameter) })
+    said_to_be(prior, &meaning(parameter))
 }
 
 fn posterior_prior(parameter: Parameter) -> Json {
@@ -233,21 +237,14 @@ fn posterior_prior(parameter: Parameter) -> Json {
     });
     let mut prior = object(properties);
     prior["required"] = json!([distribution.name]);
-    described(prior, Key { name: parameter.name(), meaning: meaning(parameter) })
+    said_to_be(prior, &meaning(parameter))
 }
 
-fn meaning(parameter: Parameter) -> &'static str {
-    match parameter {
-        Parameter::Density => "mass density of the bone, kg/m³",
-        Parameter::LongitudinalYoungModulus => "longitudinal Young modulus, Pa",
-        Parameter::LongitudinalPoissonRatio => "longitudinal Poisson ratio",
-        Parameter::LongitudinalShearModulus => "longitudinal shear modulus, Pa",
-        Parameter::TransverseYoungModulus => "transverse Young modulus, Pa",
-        Parameter::TransversePoissonRatio => "transverse Poisson ratio",
-        Parameter::Dispersion => "dispersion of the random elasticity",
-        Parameter::BoneThickness => "thickness of the bone, m",
-        Parameter::BoneQualityFactor => "quality factor of the bone",
-        Parameter::CouplingSoundSpeed => "speed of sound of the coupling layer, m/s",
+/// Returns what a parameter is, with its unit.
+fn meaning(parameter: Parameter) -> String {
+    match parameter.unit() {
+        "" => parameter.row().meaning.to_owned(),
+        unit => format!("{}, {unit}", parameter.row().meaning),
     }
 }
 
