@@ -7,11 +7,13 @@ use std::process::Command;
 
 /// Files and directories of the program's source. A change in any of them runs this script again, so
 /// that it notices a modified tree.
-const SOURCES: [&str; 24] = [
+const SOURCES: [&str; 30] = [
     ".cargo",
     "Cargo.lock",
     "Cargo.toml",
     "build.rs",
+    "client/Cargo.toml",
+    "client/src",
     "common/Cargo.toml",
     "common/src",
     "coordinator/Cargo.toml",
@@ -27,9 +29,13 @@ const SOURCES: [&str; 24] = [
     "rust-toolchain.toml",
     "search/Cargo.toml",
     "search/src",
+    "slurm/Cargo.toml",
+    "slurm/src",
     "solver/Cargo.toml",
     "solver/src",
     "src",
+    "umbridge/Cargo.toml",
+    "umbridge/src",
     "worker/Cargo.toml",
     "worker/src",
 ];

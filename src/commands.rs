@@ -75,7 +75,7 @@ fn left_by_interruption(resolved: &Resolved) -> Option<&'static str> {
         Resolved::DrainWorker { .. } => {
             Some("the worker may have been told to drain (see `osteon workers`)")
         }
-        Resolved::ScaleWorkers(_) => {
+        Resolved::ScaleWorkers { .. } => {
             Some("workers that wait or run stay, and end when they have had no work for a while")
         }
         Resolved::Backup { .. } => Some("no copy was kept"),
@@ -129,7 +129,7 @@ async fn perform(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
         Resolved::DrainWorker { worker, coordinator, format } => {
             operators::drain(worker, &coordinator, format).await
         }
-        Resolved::ScaleWorkers(plan) => scaling::follow(*plan).await,
+        Resolved::ScaleWorkers { plan, dry_run } => scaling::follow(&plan, dry_run).await,
         Resolved::JobScript(script) => slurm::job(&script),
         Resolved::WorkerArray(array) => slurm::array(&array),
         Resolved::Health { coordinator, limit, format } => {

@@ -1,5 +1,5 @@
-//! Fuzzing of results directories with damaged files, and of Slurm's lists: what is read is shown,
-//! interpreted or refused, without ever panicking.
+//! Fuzzing of results directories with damaged files: what is read is shown, interpreted or refused,
+//! without ever panicking.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,6 @@ use crate::exit_status::ExitStatus;
 use crate::output::{self, Detail, ShownResult};
 use crate::resolved::OutputFormat;
 use crate::sample_result;
-use crate::slurm::queue;
 
 const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
 
@@ -74,13 +73,6 @@ fn check_directory(job: &str, json: &str) {
     }
 }
 
-/// Reads a list of Slurm's queue: ids are never options or anything else for `scancel`.
-fn check_queue(text: &str) {
-    let Ok(workers) = bounded(text.len(), || queue::parse(text)) else { return };
-    assert!(workers.len() <= text.lines().count());
-    assert!(workers.iter().all(|worker| worker.id.starts_with(|c: char| c.is_ascii_digit())));
-}
-
 /// Returns jobs as a run writes them.
 fn stored_jobs() -> Vec<String> {
     KINDS.map(|kind| job_file::to_toml(&specification(kind))).to_vec()
@@ -89,7 +81,6 @@ fn stored_jobs() -> Vec<String> {
 #[test]
 fn every_seed_is_shown() {
     texts("results").iter().for_each(|json| check_result(json));
-    texts("squeue").iter().for_each(|text| assert!(queue::parse(text).is_ok(), "{text}"));
     for (job, json) in stored_jobs().iter().zip(texts("results")) {
         check_directory(job, &json);
     }
@@ -104,17 +95,11 @@ fn large_results_take_no_more_than_their_share() {
     check_result(&sample_result::identification(&reason).to_json());
     check_result(&"[".repeat(400_000));
     check_directory(&"\n".repeat(400_000), "");
-    check_queue(&"1|n|PENDING|0:00|r\n".repeat(20_000));
-    check_queue(&"|".repeat(400_000));
 }
 
 properties! {
     fn damaged_results_are_shown_or_refused(json in damaged_text(texts("results"))) {
         check_result(&json);
-    }
-
-    fn damaged_lists_of_slurm_are_read_or_refused(text in damaged_text(texts("squeue"))) {
-        check_queue(&text);
     }
 
     fn damaged_directories_are_taken_or_refused(

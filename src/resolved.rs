@@ -15,6 +15,8 @@ use osteon_client::request_id::RequestId;
 use osteon_common::job::JobKind;
 use osteon_proto::credentials::{CredentialFiles, Credentials};
 use osteon_proto::endpoint::Endpoint;
+use osteon_slurm::follow::ScalingPlan;
+use osteon_slurm::job_script::JobScript;
 use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
@@ -27,9 +29,8 @@ use crate::arguments::{
 };
 use crate::doctor::Patient;
 use crate::exit_status::CommandFailure;
-use crate::slurm::job_script::JobScript;
 
-pub(crate) use slurm::{ScalingPlan, WorkerArray};
+pub(crate) use slurm::WorkerArray;
 pub(crate) use umbridge::ModelService;
 
 /// Default number of worker processes of a run on this machine.
@@ -169,7 +170,12 @@ pub(crate) enum Resolved {
         format: OutputFormat,
     },
     /// `workers slurm`.
-    ScaleWorkers(Box<ScalingPlan>),
+    ScaleWorkers {
+        /// What is followed, and how.
+        plan: Box<ScalingPlan>,
+        /// Whether nothing is to be changed.
+        dry_run: bool,
+    },
     /// `slurm script`.
     JobScript(Box<JobScript>),
     /// `slurm array`.
@@ -360,7 +366,7 @@ impl Resolved {
     /// Returns the default log level: services log their events, commands only problems.
     pub(crate) fn default_log_level(&self) -> &'static str {
         match self {
-            Self::Coordinator(_) | Self::Worker { .. } | Self::ScaleWorkers(_) => "info",
+            Self::Coordinator(_) | Self::Worker { .. } | Self::ScaleWorkers { .. } => "info",
             _ => "warn",
         }
     }

@@ -4,13 +4,13 @@ use osteon_client::results_directory::ResultsDirectory;
 use osteon_files::job_file;
 use osteon_proto::credentials::Credentials;
 use osteon_proto::endpoint::Endpoint;
+use osteon_slurm::job_script::JobScript;
+use osteon_slurm::worker_script::WorkerScript;
 
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::progress::say;
 use crate::resolved::{OutputFormat, WorkerArray};
-use crate::slurm::job_script::JobScript;
-use crate::slurm::worker_script::WorkerScript;
 
 /// Name of array workers in Slurm's queue.
 const ARRAY_NAME: &str = "osteon-worker";
@@ -44,7 +44,8 @@ pub(super) fn check_workers(script: &WorkerScript) -> Result<(), CommandFailure>
     Ok(())
 }
 
-fn print(text: &str) -> Result<ExitStatus, CommandFailure> {
+/// Prints a text as it is.
+pub(super) fn print(text: &str) -> Result<ExitStatus, CommandFailure> {
     output::stdout(OutputFormat::Text).verbatim(text).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }

@@ -11,13 +11,13 @@ use osteon_client::embedded::{Embedded, EmbeddedSetup, StoreLocation};
 use osteon_common::job::JobKind;
 use osteon_coordinator::service::open_files;
 use osteon_files::job_file::{self, FilePurpose};
+use osteon_umbridge::{Evaluator, ModelListener, ServedJob, router};
 
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::progress::say;
 use crate::resolved::{ModelService, OutputFormat, RunLocation};
 use crate::signals;
-use crate::umbridge::{Evaluator, ModelListener, ServedJob, router};
 use crate::user;
 use crate::{program, warnings};
 
@@ -66,7 +66,7 @@ pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFa
     };
     let served = async {
         let client = user::connect(&remote).await?;
-        let evaluator = Evaluator::new(client, evaluated);
+        let evaluator = Evaluator::new(client, program::current(), evaluated);
         let models = Arc::new(ServedJob::new(noted.specification, evaluator.clone(), isa));
         say(&format!("serving {}; Ctrl-C ends it", models.models().join(", ")));
         let url = format!("{}\n", listener.url());

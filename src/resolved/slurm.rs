@@ -8,15 +8,16 @@ use osteon_client::client::Remote;
 use osteon_common::job::JobKind;
 use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::endpoint::Endpoint;
+use osteon_slurm::follow::ScalingPlan;
+use osteon_slurm::job_script::JobScript;
+use osteon_slurm::scaling::ScalingPolicy;
+use osteon_slurm::worker_script::{MARGIN, WorkerScript};
 
 use crate::arguments::{
     AllocationArguments, ClientArguments, JobScriptArguments, ScalingArguments, SlurmArguments,
     SlurmCommand, WorkerArrayArguments,
 };
 use crate::exit_status::CommandFailure;
-use crate::slurm::job_script::JobScript;
-use crate::slurm::scaling::ScalingPolicy;
-use crate::slurm::worker_script::{MARGIN, WorkerScript};
 
 use super::Resolved;
 
@@ -27,23 +28,6 @@ pub(crate) struct WorkerArray {
     pub(crate) script: WorkerScript,
     /// Number of workers.
     pub(crate) count: u32,
-}
-
-/// What `workers slurm` does.
-#[derive(Debug)]
-pub(crate) struct ScalingPlan {
-    /// The script of the workers.
-    pub(crate) script: WorkerScript,
-    /// The limits.
-    pub(crate) policy: ScalingPolicy,
-    /// Number of realizations of an evaluation that make a thread worth while.
-    pub(crate) realizations_per_thread: u32,
-    /// Time between two decisions.
-    pub(crate) interval: Duration,
-    /// Whether nothing is to be changed.
-    pub(crate) dry_run: bool,
-    /// The coordinator.
-    pub(crate) coordinator: Remote,
 }
 
 /// Resolves `slurm` and its subcommands.
@@ -79,14 +63,14 @@ pub(super) fn scaling(
         threads_per_worker: script.cpus,
         idle_timeout: script.idle_timeout,
     };
-    Ok(Resolved::ScaleWorkers(Box::new(ScalingPlan {
+    let plan = Box::new(ScalingPlan {
         script,
         policy,
         realizations_per_thread: arguments.realizations_per_thread,
         interval: Duration::from_secs(interval.into()),
-        dry_run,
         coordinator,
-    })))
+    });
+    Ok(Resolved::ScaleWorkers { plan, dry_run })
 }
 
 fn job_script(arguments: JobScriptArguments) -> Result<JobScript, CommandFailure> {

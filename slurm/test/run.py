@@ -17,7 +17,7 @@ import time
 import cluster
 from cluster import CALL_S_MAX, Cluster, NotReady, wait_for
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 QUICK = ROOT / "examples" / "quick.toml"
 # Longest wait for a step of a test; each takes seconds.
 STEP_S_MAX = 120

@@ -10,32 +10,32 @@ use super::shell::{absolute, quoted, without_controls};
 use super::{SlurmError, directives};
 
 /// What the script does; the settings above say with what.
-const BODY: &str = include_str!("../../deploy/slurm/worker.sh");
+const BODY: &str = include_str!("worker.sh");
 /// A worker ends this long before the time limit of its allocation, because it may take 10 s to
 /// finish its batches, and Slurm may be early by tens of seconds.
-pub(crate) const MARGIN: Duration = Duration::from_secs(60);
+pub const MARGIN: Duration = Duration::from_secs(60);
 
 /// Options of the script.
 #[derive(Debug, Clone)]
-pub(crate) struct WorkerScript {
+pub struct WorkerScript {
     /// The program, as the nodes see it.
-    pub(crate) program: PathBuf,
+    pub program: PathBuf,
     /// Address of the coordinator.
-    pub(crate) endpoint: Endpoint,
+    pub endpoint: Endpoint,
     /// Credentials of the workers.
-    pub(crate) files: CredentialFiles,
+    pub files: CredentialFiles,
     /// Number of threads, and of processors, of each worker.
-    pub(crate) cpus: u32,
+    pub cpus: u32,
     /// Time limit of each allocation, above [`MARGIN`].
-    pub(crate) time_limit: Duration,
+    pub time_limit: Duration,
     /// Time over which the ends of workers that begin together are spread.
-    pub(crate) stagger: Duration,
+    pub stagger: Duration,
     /// Time without work after which a worker ends.
-    pub(crate) idle_timeout: Duration,
+    pub idle_timeout: Duration,
     /// Partition; `None` for Slurm's default.
-    pub(crate) partition: Option<String>,
+    pub partition: Option<String>,
     /// Further options of sbatch.
-    pub(crate) further: Vec<String>,
+    pub further: Vec<String>,
 }
 
 impl WorkerScript {
@@ -44,7 +44,7 @@ impl WorkerScript {
     ///
     /// # Errors
     /// If an option cannot be part of a script.
-    pub(crate) fn text(&self, name: &str, count: u32, lasting: bool) -> Result<String, SlurmError> {
+    pub fn text(&self, name: &str, count: u32, lasting: bool) -> Result<String, SlurmError> {
         let mut own = vec![
             format!("--job-name={name}"),
             format!("--array=1-{count}"),

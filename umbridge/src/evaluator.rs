@@ -11,6 +11,7 @@ use osteon_client::request_id::RequestId;
 use osteon_common::job::JobSpecification;
 use osteon_common::moments::Estimate;
 use osteon_common::outcome::{FailureCounts, Outcome};
+use osteon_common::version::Program;
 use osteon_files::report::ResultFile;
 use osteon_proto::v1::JobSnapshot;
 use tokio::runtime::Handle;
@@ -18,7 +19,6 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
 use super::protocol_error::ProtocolError;
-use crate::program;
 
 /// Maximum number of points that are evaluated at a time; others wait. More than a coordinator works
 /// on at a time, so that it always has a next one.
@@ -32,8 +32,10 @@ const JOB_NAME: &str = "umbridge";
 
 /// Submits points to a coordinator and waits for their results.
 #[derive(Debug, Clone)]
-pub(crate) struct Evaluator {
+pub struct Evaluator {
     client: Client,
+    /// This program, whose numbers results are compared with.
+    program: Program,
     places: Arc<Semaphore>,
     /// Number of points evaluated so far.
     evaluated: Arc<AtomicU64>,
@@ -53,9 +55,10 @@ pub(super) struct PointResult {
 }
 
 impl Evaluator {
-    /// Creates an evaluator; `evaluated` counts its points.
-    pub(crate) fn new(client: Client, evaluated: Arc<AtomicU64>) -> Self {
-        Self { client, places: Arc::new(Semaphore::new(POINTS_MAX as usize)), evaluated }
+    /// Creates an evaluator of this `program`; `evaluated` counts its points.
+    pub fn new(client: Client, program: Program, evaluated: Arc<AtomicU64>) -> Self {
+        let places = Arc::new(Semaphore::new(POINTS_MAX as usize));
+        Self { client, program, places, evaluated }
     }
 
     /// Evaluates the point of a propagation. If the future is dropped, the job is cancelled.
@@ -87,12 +90,12 @@ impl Evaluator {
         };
         running.has_ended();
         self.evaluated.fetch_add(1, Ordering::Relaxed);
-        result_of(job, fetched)
+        result_of(job, fetched, &self.program)
     }
 
     /// Waits a moment until jobs whose requests are gone have been cancelled; nothing is evaluated any
     /// more.
-    pub(crate) async fn end(&self) {
+    pub async fn end(&self) {
         let all = self.places.acquire_many(POINTS_MAX);
         // If the coordinator does not answer, its jobs end by themselves.
         let _ = timeout(Duration::from_secs(CANCEL_S_MAX), all).await;
@@ -148,9 +151,13 @@ fn refused(error: ClientError) -> ProtocolError {
 }
 
 /// Returns what a job has computed.
-fn result_of(job: &JobSpecification, fetched: Fetched) -> Result<PointResult, ProtocolError> {
+fn result_of(
+    job: &JobSpecification,
+    fetched: Fetched,
+    program: &Program,
+) -> Result<PointResult, ProtocolError> {
     let Fetched { specification: computed, reason, result, samples, .. } = fetched;
-    other_version::check(job, &computed, (&program::current(), &result.program()))
+    other_version::check(job, &computed, (program, &result.program()))
         .map_err(|error| ProtocolError::output(error.to_string()))?;
     let ResultFile::Propagation(found) = result else {
         return Err(ProtocolError::output(
@@ -202,6 +209,7 @@ mod tests {
     use super::*;
     use osteon_client::client::{self, Remote};
     use osteon_client::environment::Unused;
+    use osteon_client::listener::Silent;
 
     /// Forwards one connection; while `held` is true, answers wait.
     async fn holds_answers(from: UnixListener, to: PathBuf, mut held: watch::Receiver<bool>) {
@@ -228,7 +236,7 @@ mod tests {
         let (files, unused) = (CredentialFiles::default(), Unused::default());
         let endpoint = Endpoint::Unix(socket.to_owned());
         let remote = Remote { endpoint, files, from_environment: false, unused };
-        crate::user::connect(&remote).await.unwrap()
+        Client::connect(&remote, Arc::new(Silent)).await.unwrap()
     }
 
     /// Polls until `witness` sees one job of which `wanted` is true.
@@ -256,10 +264,11 @@ mod tests {
         let (hold, held) = watch::channel(false);
         let listener = UnixListener::bind(&between).unwrap();
         let proxy = tokio::spawn(holds_answers(listener, there.clone(), held));
-        let evaluator = Evaluator::new(connected(&between).await, Arc::default());
+        let evaluator =
+            Evaluator::new(connected(&between).await, Program::current(None), Arc::default());
         let mut witness = connected(&there).await;
         hold.send(true).unwrap();
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/quick.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/quick.toml");
         let job = job_file::read(&path, JobKind::Propagation).unwrap();
         tokio::select! {
             result = evaluator.evaluate(&job) => panic!("{result:?}"),

@@ -9,39 +9,39 @@ use super::shell::{absolute, quoted, without_controls};
 use super::{SlurmError, directives};
 
 /// What the script does; the settings above say with what.
-const BODY: &str = include_str!("../../deploy/slurm/job.sh");
+const BODY: &str = include_str!("job.sh");
 /// Longest wait of the script for its coordinator, s. A large store takes a while to open.
 const START_S_MAX: u32 = 300;
 
 /// Options of the script.
 #[derive(Debug, Clone)]
-pub(crate) struct JobScript {
+pub struct JobScript {
     /// The program, as the nodes see it.
-    pub(crate) program: PathBuf,
+    pub program: PathBuf,
     /// The job file.
-    pub(crate) job: PathBuf,
+    pub job: PathBuf,
     /// Kind of the job.
-    pub(crate) kind: JobKind,
+    pub kind: JobKind,
     /// Name of the job, in Slurm's queue and of the coordinator.
-    pub(crate) name: String,
+    pub name: String,
     /// Number of nodes.
-    pub(crate) nodes: u32,
+    pub nodes: u32,
     /// Processors of each node; `None` for whole nodes.
-    pub(crate) cpus_per_node: Option<u32>,
+    pub cpus_per_node: Option<u32>,
     /// Time limit of one allocation; `None` for that of the partition.
-    pub(crate) time_limit: Option<Duration>,
+    pub time_limit: Option<Duration>,
     /// Partition; `None` for Slurm's default.
-    pub(crate) partition: Option<String>,
+    pub partition: Option<String>,
     /// Directory of the coordinator's store.
-    pub(crate) store: PathBuf,
+    pub store: PathBuf,
     /// Directory of the results.
-    pub(crate) out: PathBuf,
+    pub out: PathBuf,
     /// How often the job may be requeued.
-    pub(crate) max_requeues: u32,
+    pub max_requeues: u32,
     /// Time before the time limit at which the processes are asked to end, s.
-    pub(crate) stop_before_s: u32,
+    pub stop_before_s: u32,
     /// Further options of sbatch.
-    pub(crate) further: Vec<String>,
+    pub further: Vec<String>,
 }
 
 impl JobScript {
@@ -49,7 +49,7 @@ impl JobScript {
     ///
     /// # Errors
     /// If an option cannot be part of a script.
-    pub(crate) fn text(&self) -> Result<String, SlurmError> {
+    pub fn text(&self) -> Result<String, SlurmError> {
         let directives = directives::lines(&self.directives()?, &self.further)?;
         let command = match self.kind {
             JobKind::Identification => "identify",

@@ -15,17 +15,17 @@ const SOUND_AFTER: Duration = Duration::from_secs(60);
 
 /// Limits set by the user.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct ScalingPolicy {
+pub struct ScalingPolicy {
     /// Number of workers that are kept without work, too.
-    pub(crate) min: u32,
+    pub min: u32,
     /// Largest number of workers, waiting ones included; at least `min`.
-    pub(crate) max: u32,
+    pub max: u32,
     /// Largest number of workers that wait in Slurm's queue.
-    pub(crate) backlog: u32,
+    pub backlog: u32,
     /// Number of threads of each worker, above 0.
-    pub(crate) threads_per_worker: u32,
+    pub threads_per_worker: u32,
     /// Waiting workers for which there is no work are cancelled after this long.
-    pub(crate) idle_timeout: Duration,
+    pub idle_timeout: Duration,
 }
 
 /// What is seen at one moment.
@@ -41,7 +41,7 @@ pub(crate) struct QueueObservation {
 
 /// Something to be done.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum ScalingAction {
+pub enum ScalingAction {
     /// Submit workers.
     Submit {
         /// Their number, above 0.
@@ -58,11 +58,11 @@ pub(crate) enum ScalingAction {
 
 /// What is to be done, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Decision {
+pub struct Decision {
     /// The actions, in order.
-    pub(crate) actions: Vec<ScalingAction>,
+    pub actions: Vec<ScalingAction>,
     /// The state, and the reason why no more is done.
-    pub(crate) reason: String,
+    pub reason: String,
 }
 
 /// State between two decisions.

@@ -1,7 +1,7 @@
 """A real Slurm of four virtual nodes on this machine, from Debian's packages, in a directory of its
 own. Uses the standard library only.
 
-    python3 deploy/slurm/test/cluster.py        starts it, says how to use it, ends it at Ctrl-C
+    python3 slurm/test/cluster.py        starts it, says how to use it, ends it at Ctrl-C
 """
 
 import contextlib

@@ -29,7 +29,7 @@ type KeptDensity = Arc<OnceCell<PosteriorDensity>>;
 
 /// A job whose models are served.
 #[derive(Debug)]
-pub(crate) struct ServedJob {
+pub struct ServedJob {
     specification: Arc<JobSpecification>,
     evaluator: Evaluator,
     cases: CaseSolver,
@@ -51,7 +51,7 @@ pub(super) struct ModelValue {
 
 impl ServedJob {
     /// Creates the models of a job.
-    pub(crate) fn new(specification: JobSpecification, evaluator: Evaluator, isa: Isa) -> Self {
+    pub fn new(specification: JobSpecification, evaluator: Evaluator, isa: Isa) -> Self {
         let specification = Arc::new(specification);
         let data = specification.data.as_ref();
         let velocities_only = specification.observables().is_empty();
@@ -69,7 +69,7 @@ impl ServedJob {
     }
 
     /// Returns the names of the models.
-    pub(crate) fn models(&self) -> Vec<&'static str> {
+    pub fn models(&self) -> Vec<&'static str> {
         ServedModel::offered(self.has_posterior).map(ServedModel::name).collect()
     }
 

@@ -134,7 +134,7 @@ fn differentiated(
 }
 
 /// Returns the endpoints for a job, behind the gate, which knows `hosts`.
-pub(crate) fn router(served: Arc<ServedJob>, hosts: OwnHosts) -> Router {
+pub fn router(served: Arc<ServedJob>, hosts: OwnHosts) -> Router {
     let mut router = Router::new().route("/", get(front)).route("/Info", get(info));
     for operation in Operation::ALL {
         let answered = move |State(served): State<Arc<ServedJob>>, request: Request| async move {

@@ -1,15 +1,20 @@
 //! Slurm: batch scripts that run osteon, and the number of workers that a queue of jobs needs.
 //!
 //! [`job_script`] and [`worker_script`] are texts made from options, [`scaling`] decides what to
-//! submit and cancel. Only [`programs`] runs anything.
+//! submit and cancel, and [`follow`] does it. Only `programs` runs anything.
 
-pub(crate) mod directives;
-pub(crate) mod job_script;
-pub(crate) mod programs;
-pub(crate) mod queue;
-pub(crate) mod scaling;
-pub(crate) mod shell;
-pub(crate) mod worker_script;
+#![forbid(unsafe_code)]
+
+mod directives;
+pub mod follow;
+#[cfg(test)]
+mod fuzz;
+pub mod job_script;
+mod programs;
+mod queue;
+pub mod scaling;
+mod shell;
+pub mod worker_script;
 
 use std::path::PathBuf;
 
@@ -17,7 +22,7 @@ use thiserror::Error;
 
 /// Reason why a script cannot be made, or why Slurm cannot be used.
 #[derive(Debug, Error)]
-pub(crate) enum SlurmError {
+pub enum SlurmError {
     /// A word after `--` is no option and follows none.
     #[error(
         "`{word}` after -- is not an option of sbatch; write for example -- --account=NAME or \

@@ -32,14 +32,14 @@ const REFUSED_WAIT: Duration = Duration::from_millis(100);
 #[error(
     "cannot listen on {address}: {source}; choose another --port (0 selects a free one) or --address"
 )]
-pub(crate) struct ModelBindError {
+pub struct ModelBindError {
     address: SocketAddr,
     source: io::Error,
 }
 
 /// A bound address.
 #[derive(Debug)]
-pub(crate) struct ModelListener {
+pub struct ModelListener {
     listener: TcpListener,
     url: String,
 }
@@ -49,7 +49,7 @@ impl ModelListener {
     ///
     /// # Errors
     /// When the operating system refuses it.
-    pub(crate) async fn bind(address: SocketAddr) -> Result<Self, ModelBindError> {
+    pub async fn bind(address: SocketAddr) -> Result<Self, ModelBindError> {
         let refused = |source| ModelBindError { address, source };
         let listener = TcpListener::bind(address).await.map_err(refused)?;
         let url = format!("http://{}", listener.local_addr().map_err(refused)?);
@@ -57,12 +57,12 @@ impl ModelListener {
     }
 
     /// Returns the URL for clients.
-    pub(crate) fn url(&self) -> &str {
+    pub fn url(&self) -> &str {
         &self.url
     }
 
     /// Serves until the future is dropped, which closes every connection.
-    pub(crate) async fn serve(&self, router: Router) {
+    pub async fn serve(&self, router: Router) {
         self.serve_within(LIMITS, router).await;
     }
 
