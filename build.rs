@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// Files and directories of the program's source. A change in any of them runs this script again, so
 /// that it notices a modified tree.
-const SOURCES: [&str; 30] = [
+const SOURCES: [&str; 32] = [
     ".cargo",
     "Cargo.lock",
     "Cargo.toml",
@@ -20,6 +20,8 @@ const SOURCES: [&str; 30] = [
     "coordinator/src",
     "files/Cargo.toml",
     "files/src",
+    "http/Cargo.toml",
+    "http/src",
     "proto/Cargo.toml",
     "proto/build.rs",
     "proto/osteon",

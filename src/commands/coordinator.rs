@@ -1,6 +1,7 @@
 //! `coordinator`: serves jobs to clients and workers until it is asked to end.
 
 use std::fs;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::pin::pin;
 
@@ -10,7 +11,7 @@ use osteon_common::visible;
 use osteon_coordinator::service::open_files;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
 use osteon_coordinator::{
-    BindError, Config, Coordinator, ListenAddress, MetricsListener, PageBindError,
+    BindError, Config, Coordinator, ListenAddress, Listener, MetricsListener,
 };
 
 use crate::arguments::CoordinatorArguments;
@@ -58,7 +59,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
         None => listener,
         Some(address) => {
             let hosts = arguments.http_host.clone();
-            listener.with_page(address, arguments.insecure, hosts).await.map_err(page_failure)?
+            with_page(listener, address, arguments.insecure, hosts).await?
         }
     };
     let listener = listener.with_spans(telemetry::recorder());
@@ -157,9 +158,27 @@ fn bind_failure(error: BindError) -> CommandFailure {
     }
 }
 
-fn page_failure(error: PageBindError) -> CommandFailure {
-    match error {
+/// Adds the live page.
+#[cfg(feature = "live")]
+async fn with_page(
+    listener: Listener,
+    address: SocketAddr,
+    insecure: bool,
+    hosts: Vec<String>,
+) -> Result<Listener, CommandFailure> {
+    use osteon_coordinator::PageBindError;
+    listener.with_page(address, insecure, hosts).await.map_err(|error| match error {
         PageBindError::Refused { .. } => CommandFailure::failed(error),
         _ => CommandFailure::bad_input(error),
-    }
+    })
+}
+
+#[cfg(not(feature = "live"))]
+async fn with_page(
+    _: Listener,
+    _: SocketAddr,
+    _: bool,
+    _: Vec<String>,
+) -> Result<Listener, CommandFailure> {
+    Err(CommandFailure::bad_input(anyhow::anyhow!("this program was built without the live page")))
 }

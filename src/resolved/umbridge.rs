@@ -4,8 +4,9 @@ use std::net::SocketAddr;
 
 use anyhow::anyhow;
 use osteon_client::environment::Environment;
-use osteon_coordinator::OwnHosts;
+use osteon_http::OwnHosts;
 use osteon_proto::credentials::CredentialFiles;
+use osteon_proto::identity::host_name;
 use osteon_solver::Isa;
 
 use crate::arguments::{JobFileArguments, UmbridgeArguments};
@@ -57,7 +58,7 @@ pub(super) fn service(
     let files = CredentialFiles::from(credentials);
     let location =
         Locating { workers, threads, coordinator, files }.location(cores, environment)?;
-    let (address, hosts) = (SocketAddr::new(address, port), OwnHosts::with(http_host));
+    let (address, hosts) = (SocketAddr::new(address, port), OwnHosts::new(host_name(), http_host));
     Ok(ModelService { job, address, hosts, location, isa })
 }
 

@@ -7,7 +7,7 @@ use axum::extract::{Request, State};
 use axum::http::StatusCode;
 use axum::middleware::Next;
 use axum::response::Response;
-use osteon_coordinator::{OwnHosts, host_of, is_cross_site};
+use osteon_http::{OwnHosts, host_of, is_cross_site};
 
 use super::protocol_error::{ProtocolError, quoted};
 use super::routes;
@@ -50,7 +50,7 @@ mod tests {
         for (name, value) in headers {
             request = request.header(*name, *value);
         }
-        let hosts = OwnHosts::with(vec!["model.example.org".to_owned()]);
+        let hosts = OwnHosts::new(None, vec!["model.example.org".to_owned()]);
         let admitted = admit(&hosts, &request.body(()).unwrap());
         admitted.err().map_or(200, |error| error.status.as_u16())
     }

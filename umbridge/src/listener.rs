@@ -4,28 +4,17 @@ use std::future::ready;
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::Duration;
 
 use axum::Router;
 use axum::http::header::{CONNECTION, HeaderValue};
 use axum::middleware::map_response;
 use axum::response::Response;
-use hyper::server::conn::http1;
-use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::service::TowerToHyperService;
-use osteon_coordinator::ReadPeer;
+use osteon_http::{ConnectionBounds, Connections};
 use thiserror::Error;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::task::JoinSet;
-use tokio::time::{sleep, timeout};
 
 use super::crowd::{Admission, Crowd, CrowdLimits, LIMITS};
 use super::routes;
-
-/// Maximum size of the header of a request, bytes.
-const HEADER_BYTES_MAX: usize = 16 * 1024;
-/// Pause after the operating system failed to accept a connection.
-const REFUSED_WAIT: Duration = Duration::from_millis(100);
 
 /// Error when the address cannot be bound.
 #[derive(Debug, Error)]
@@ -68,18 +57,12 @@ impl ModelListener {
 
     async fn serve_within(&self, limits: CrowdLimits, router: Router) {
         let service = Arc::new(Service::new(limits, router));
-        let mut connections = JoinSet::new();
+        let mut connections = Connections::default();
         loop {
-            match self.listener.accept().await {
-                Ok((stream, _)) => {
-                    // Connections are admitted in the order in which they arrive.
-                    let Some(admission) = service.crowd.admit().await else { return };
-                    connections.spawn(Arc::clone(&service).connection(stream, admission));
-                }
-                // Too many files are open, say.
-                Err(_) => sleep(REFUSED_WAIT).await,
-            }
-            while connections.try_join_next().is_some() {}
+            let stream = osteon_http::accept(&self.listener).await;
+            // Connections are admitted in the order in which they arrive.
+            let Some(admission) = service.crowd.admit().await else { return };
+            connections.begin(Arc::clone(&service).connection(stream, admission));
         }
     }
 }
@@ -113,34 +96,21 @@ impl Service {
 
     /// Serves a connection, or refuses it.
     async fn connection(self: Arc<Self>, stream: TcpStream, admission: Admission) {
-        // Small answers must not wait for acknowledgements of earlier ones.
-        let _unsupported = stream.set_nodelay(true);
         let (_place, served) = match self.crowd.settle(admission).await {
             Admission::Served(place) => (place, true),
             Admission::Waits(place) | Admission::Refused(place) => (place, false),
         };
         let router = if served { &self.router } else { &self.busy };
-        let connection = http1::Builder::new()
-            .timer(TokioTimer::new())
-            .header_read_timeout(self.limits.header)
-            .max_buf_size(HEADER_BYTES_MAX)
-            .keep_alive(served)
-            .serve_connection(
-                TokioIo::new(ReadPeer::new(stream)),
-                TowerToHyperService::new(router.clone()),
-            );
-        // Whether a client was slow or has gone makes no difference here.
-        if served {
-            let _ = connection.await;
-        } else {
-            let _ = timeout(self.limits.refusal, connection).await;
-        }
+        let CrowdLimits { header, refusal, .. } = self.limits;
+        let whole = (!served).then_some(refusal);
+        let bounds = ConnectionBounds { header, whole, keep_alive: served };
+        bounds.answer(stream, router.clone()).await;
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::Instant;
+    use std::time::{Duration, Instant};
 
     use axum::routing::get;
     use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};

@@ -12,7 +12,7 @@ use axum::middleware::from_fn_with_state;
 use axum::response::Response;
 use axum::routing::{get, post};
 use http_body_util::{BodyExt as _, LengthLimitError, Limited};
-use osteon_coordinator::OwnHosts;
+use osteon_http::OwnHosts;
 use serde_json::{Value, json};
 use tokio::time::timeout;
 

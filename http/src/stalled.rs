@@ -14,7 +14,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// A connection whose writes fail when its peer has stopped reading for 30 s. Otherwise a page that nobody looks
 /// at, or a client that sends request after request and reads no answer, would occupy it forever.
 #[derive(Debug)]
-pub struct ReadPeer<C> {
+pub(crate) struct ReadPeer<C> {
     connection: C,
     /// Time limit of the write under way.
     patience: Option<Pin<Box<Sleep>>>,
@@ -22,7 +22,7 @@ pub struct ReadPeer<C> {
 
 impl<C> ReadPeer<C> {
     /// Wraps a connection.
-    pub fn new(connection: C) -> Self {
+    pub(crate) fn new(connection: C) -> Self {
         Self { connection, patience: None }
     }
 

@@ -11,7 +11,6 @@ use std::sync::Arc;
 
 use axum::http::header::{HOST, HeaderName, ORIGIN};
 use axum::http::{HeaderMap, Method, Request};
-use osteon_proto::identity::host_name;
 
 /// Where a request comes from, as the browser says.
 const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
@@ -21,10 +20,10 @@ const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 pub struct OwnHosts(Arc<Vec<String>>);
 
 impl OwnHosts {
-    /// Returns `further` ones with those that every machine has.
-    pub fn with(mut further: Vec<String>) -> Self {
+    /// Returns those of this machine, which may have a name, with `further` ones.
+    pub fn new(machine: Option<String>, mut further: Vec<String>) -> Self {
         further.push("localhost".to_owned());
-        further.extend(host_name());
+        further.extend(machine);
         Self(Arc::new(further))
     }
 
