@@ -24,16 +24,17 @@ mod observations;
 mod output;
 mod program;
 mod progress;
-mod report_directory;
 mod resolved;
 #[cfg(test)]
 mod sample_result;
 mod signals;
 mod simulation_directory;
+mod surroundings;
 mod telemetry;
 mod unsearched_groups;
 mod user;
 mod warnings;
+mod wings;
 
 use std::process::ExitCode;
 

@@ -53,7 +53,6 @@ fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
         ("osteon", "osteon-common"),
         ("osteon", "osteon-coordinator"),
         ("osteon", "osteon-files"),
-        ("osteon", "osteon-http"),
         ("osteon", "osteon-proto"),
         ("osteon", "osteon-report"),
         ("osteon", "osteon-search"),

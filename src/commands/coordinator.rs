@@ -1,7 +1,6 @@
 //! `coordinator`: serves jobs to clients and workers until it is asked to end.
 
 use std::fs;
-use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::pin::pin;
 
@@ -10,9 +9,7 @@ use osteon_client::result_files;
 use osteon_common::visible;
 use osteon_coordinator::service::open_files;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
-use osteon_coordinator::{
-    BindError, Config, Coordinator, ListenAddress, Listener, MetricsListener,
-};
+use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress, MetricsListener};
 
 use crate::arguments::CoordinatorArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
@@ -55,13 +52,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
             listener.with_metrics(metrics)
         }
     };
-    let listener = match arguments.http {
-        None => listener,
-        Some(address) => {
-            let hosts = arguments.http_host.clone();
-            with_page(listener, address, arguments.insecure, hosts).await?
-        }
-    };
+    let listener = arguments.page.add_to(listener, arguments.insecure).await?;
     let listener = listener.with_spans(telemetry::recorder());
     let lost = if arguments.accept_lost_jobs { LostJobs::Accept } else { LostJobs::Refuse };
     let store = SqliteStore::open_with(&directory, lost).map_err(CommandFailure::failed)?;
@@ -156,29 +147,4 @@ fn bind_failure(error: BindError) -> CommandFailure {
         BindError::NotLoopback { .. } => CommandFailure::bad_input(error),
         _ => CommandFailure::failed(error),
     }
-}
-
-/// Adds the live page.
-#[cfg(feature = "live")]
-async fn with_page(
-    listener: Listener,
-    address: SocketAddr,
-    insecure: bool,
-    hosts: Vec<String>,
-) -> Result<Listener, CommandFailure> {
-    use osteon_coordinator::PageBindError;
-    listener.with_page(address, insecure, hosts).await.map_err(|error| match error {
-        PageBindError::Refused { .. } => CommandFailure::failed(error),
-        _ => CommandFailure::bad_input(error),
-    })
-}
-
-#[cfg(not(feature = "live"))]
-async fn with_page(
-    _: Listener,
-    _: SocketAddr,
-    _: bool,
-    _: Vec<String>,
-) -> Result<Listener, CommandFailure> {
-    Err(CommandFailure::bad_input(anyhow::anyhow!("this program was built without the live page")))
 }

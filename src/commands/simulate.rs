@@ -18,7 +18,6 @@ use crate::arguments::SimulateArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output::{self, ShownSimulation};
 use crate::progress::say;
-use crate::report_directory;
 use crate::resolved;
 use crate::simulation_directory::{SimulationKey, TRACES};
 use crate::warnings;
@@ -38,7 +37,7 @@ pub(super) async fn simulate(
     warnings::say_all(&case_warnings(&case));
     let traces = arguments.out.as_ref().map(|directory| directory.join(TRACES));
     let setup = case.setup;
-    let reported = arguments.out.clone().filter(|_| arguments.report);
+    let (report, out) = (arguments.report.clone(), arguments.out.clone());
     let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments, isa));
     let solved = said_while(solved, &setup).await.map_err(CommandFailure::failed)??;
     let shown = ShownSimulation {
@@ -50,9 +49,7 @@ pub(super) async fn simulate(
         check: solved.check.as_ref(),
     };
     output::stdout(format).simulation(&shown).map_err(stdout_failure)?;
-    if let Some(directory) = reported {
-        report_directory::write_beside(&directory)?;
-    }
+    report.write(out.as_deref())?;
     let passed = solved.check.as_ref().is_none_or(Check::passed);
     Ok(if passed && solved.arrival.is_ok() { ExitStatus::Done } else { ExitStatus::RunFailed })
 }

@@ -25,3 +25,4 @@ pub use self::evaluator::Evaluator;
 pub use self::functions::ServedJob;
 pub use self::listener::{ModelBindError, ModelListener};
 pub use self::routes::router;
+pub use osteon_http::OwnHosts;

@@ -16,11 +16,10 @@ use osteon_files::report::{ReadError, ResultFile, Simulation};
 use osteon_report::{JobTables, ReportedRun, TableError};
 
 use crate::exit_status::CommandFailure;
-use crate::progress::say;
 use crate::simulation_directory::TRACES;
 
 /// Folder of a report within a directory of results.
-pub(crate) const REPORT: &str = "report";
+pub(super) const REPORT: &str = "report";
 /// The page.
 const PAGE: &str = "index.html";
 
@@ -28,7 +27,7 @@ const PAGE: &str = "index.html";
 ///
 /// # Errors
 /// Bad input if there are none, or if a file of them is damaged.
-pub(crate) fn read(directory: &Path) -> Result<ReportedRun, CommandFailure> {
+pub(super) fn read(directory: &Path) -> Result<ReportedRun, CommandFailure> {
     let Some(text) = read_named_file(&directory.join(RESULT))? else {
         return Err(CommandFailure::bad_input(anyhow!(
             "{} does not exist: {} holds no complete results; run `osteon identify`, `propagate` or \
@@ -94,7 +93,7 @@ fn simulation(
 ///
 /// # Errors
 /// If the directory cannot be written, or holds files that are not of a report.
-pub(crate) fn write(out: &Path, runs: &[ReportedRun]) -> Result<String, CommandFailure> {
+pub(super) fn write(out: &Path, runs: &[ReportedRun]) -> Result<String, CommandFailure> {
     make_directory(out)?;
     let page = out.join(PAGE);
     if out.join(RESULT).exists() || out.join(JOB).exists() || out.join(CASE).exists() {
@@ -125,14 +124,4 @@ pub(crate) fn write(out: &Path, runs: &[ReportedRun]) -> Result<String, CommandF
     };
     write().map_err(CommandFailure::Failed)?;
     Ok(visible::path(&page))
-}
-
-/// Writes the report of the results in `directory` to its folder `report`, and says where it is.
-///
-/// # Errors
-/// Same as [`read()`] and [`write()`].
-pub(crate) fn write_beside(directory: &Path) -> Result<(), CommandFailure> {
-    let page = write(&directory.join(REPORT), &[read(directory)?])?;
-    say(&format!("report: {page}"));
-    Ok(())
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand};
 
-use super::{ClientArguments, age, job_name};
+use crate::arguments::{ClientArguments, SECONDS_MAX, age, job_name};
 
 /// Largest number of workers that one command may ask for.
 const WORKERS_MAX: i64 = 4096;
@@ -162,7 +162,7 @@ fn allocation_time(text: &str) -> Result<Duration, String> {
 
 fn idle_time(text: &str) -> Result<Duration, String> {
     let limit = age(text)?;
-    match (1.0..=super::SECONDS_MAX).contains(&limit.as_secs_f64()) {
+    match (1.0..=SECONDS_MAX).contains(&limit.as_secs_f64()) {
         true => Ok(limit),
         false => Err("it must be from 1s to 366d".to_owned()),
     }

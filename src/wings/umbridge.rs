@@ -1,5 +1,8 @@
 //! `umbridge`: serves the models of a job to clients of UM-Bridge until it is asked to end.
 
+mod arguments;
+mod resolved;
+
 use std::future::pending;
 use std::pin::pin;
 use std::sync::Arc;
@@ -13,19 +16,35 @@ use osteon_coordinator::service::open_files;
 use osteon_files::job_file::{self, FilePurpose};
 use osteon_umbridge::{Evaluator, ModelListener, ServedJob, router};
 
+use self::resolved::ModelService;
+use super::{Performance, ResolvedWing, WingCommand};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::progress::say;
-use crate::resolved::{ModelService, OutputFormat, RunLocation};
+use crate::resolved::OutputFormat;
 use crate::signals;
+use crate::surroundings::{RunLocation, Surroundings};
 use crate::user;
 use crate::{program, warnings};
+
+pub(super) use self::arguments::UmbridgeArguments;
 
 /// Time that an embedded coordinator keeps evaluated points: long enough to be fetched.
 const KEPT: Duration = Duration::from_secs(60);
 
+/// Resolves the arguments.
+pub(super) fn resolve(arguments: UmbridgeArguments, around: &Surroundings) -> ResolvedWing {
+    Ok(Box::new(resolved::service(arguments, around)?))
+}
+
+impl WingCommand for ModelService {
+    fn perform(self: Box<Self>) -> Performance {
+        Box::pin(serve(*self))
+    }
+}
+
 /// Serves until SIGINT or SIGTERM, or until the workers cannot continue. The URL is printed.
-pub(super) async fn serve(service: ModelService) -> Result<ExitStatus, CommandFailure> {
+async fn serve(service: ModelService) -> Result<ExitStatus, CommandFailure> {
     let ModelService { job, address, hosts, location, isa } = service;
     let input = job.open().map_err(CommandFailure::bad_input)?;
     let kind = match job_file::purpose(&input).map_err(CommandFailure::bad_input)? {

@@ -3,16 +3,14 @@
 use std::net::SocketAddr;
 
 use anyhow::anyhow;
-use osteon_client::environment::Environment;
-use osteon_http::OwnHosts;
-use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::identity::host_name;
 use osteon_solver::Isa;
+use osteon_umbridge::OwnHosts;
 
-use crate::arguments::{JobFileArguments, UmbridgeArguments};
+use super::arguments::UmbridgeArguments;
+use crate::arguments::JobFileArguments;
 use crate::exit_status::CommandFailure;
-
-use super::{Locating, RunLocation};
+use crate::surroundings::{Locating, RunLocation, Surroundings};
 
 /// The protocol's usual port.
 const PORT_DEFAULT: u16 = 4242;
@@ -21,25 +19,23 @@ const PORT_VARIABLE: &str = "PORT";
 
 /// A server of a job's models.
 #[derive(Debug)]
-pub(crate) struct ModelService {
+pub(super) struct ModelService {
     /// The job file.
-    pub(crate) job: JobFileArguments,
+    pub(super) job: JobFileArguments,
     /// Address to listen on.
-    pub(crate) address: SocketAddr,
+    pub(super) address: SocketAddr,
     /// Hosts that requests may name.
-    pub(crate) hosts: OwnHosts,
+    pub(super) hosts: OwnHosts,
     /// Where points are evaluated.
-    pub(crate) location: RunLocation,
+    pub(super) location: RunLocation,
     /// The instruction set to compute single cases on.
-    pub(crate) isa: Isa,
+    pub(super) isa: Isa,
 }
 
 /// Resolves the arguments.
 pub(super) fn service(
     arguments: UmbridgeArguments,
-    environment: &Environment,
-    cores: u32,
-    isa: Isa,
+    around: &Surroundings,
 ) -> Result<ModelService, CommandFailure> {
     let UmbridgeArguments {
         job,
@@ -55,11 +51,9 @@ pub(super) fn service(
         Some(port) => port,
         None => port_of(std::env::var(PORT_VARIABLE).ok())?,
     };
-    let files = CredentialFiles::from(credentials);
-    let location =
-        Locating { workers, threads, coordinator, files }.location(cores, environment)?;
+    let location = around.locate(Locating { workers, threads, coordinator, credentials })?;
     let (address, hosts) = (SocketAddr::new(address, port), OwnHosts::new(host_name(), http_host));
-    Ok(ModelService { job, address, hosts, location, isa })
+    Ok(ModelService { job, address, hosts, location, isa: Surroundings::isa()? })
 }
 
 /// Returns the port that the environment names; an empty variable counts as unset.

@@ -13,43 +13,57 @@ use osteon_slurm::job_script::JobScript;
 use osteon_slurm::scaling::ScalingPolicy;
 use osteon_slurm::worker_script::{MARGIN, WorkerScript};
 
-use crate::arguments::{
-    AllocationArguments, ClientArguments, JobScriptArguments, ScalingArguments, SlurmArguments,
-    SlurmCommand, WorkerArrayArguments,
+use super::arguments::{
+    AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
+    WorkerArrayArguments,
 };
+use crate::arguments::ClientArguments;
 use crate::exit_status::CommandFailure;
+use crate::surroundings::Surroundings;
 
-use super::Resolved;
-
-/// An array of workers.
+/// A command about Slurm.
 #[derive(Debug)]
-pub(crate) struct WorkerArray {
-    /// The script.
-    pub(crate) script: WorkerScript,
-    /// Number of workers.
-    pub(crate) count: u32,
+pub(super) enum SlurmTask {
+    /// `slurm script`.
+    Job(Box<JobScript>),
+    /// `slurm array`.
+    Array {
+        /// The script.
+        script: Box<WorkerScript>,
+        /// Number of workers.
+        count: u32,
+    },
+    /// `workers slurm`.
+    Follow {
+        /// What is followed, and how.
+        plan: Box<ScalingPlan>,
+        /// Whether nothing is to be changed.
+        dry_run: bool,
+    },
 }
 
 /// Resolves `slurm` and its subcommands.
 pub(super) fn scripts(
     arguments: SlurmArguments,
-    remote: impl Fn(ClientArguments) -> Result<Remote, CommandFailure>,
-) -> Result<Resolved, CommandFailure> {
+    around: &Surroundings,
+) -> Result<SlurmTask, CommandFailure> {
     match arguments.command {
-        SlurmCommand::Script(script) => Ok(Resolved::JobScript(Box::new(job_script(script)?))),
+        SlurmCommand::Script(script) => Ok(SlurmTask::Job(Box::new(job_script(script)?))),
         SlurmCommand::Array(WorkerArrayArguments { count, client, allocation }) => {
-            let script = worker_script(allocation, &remote(client)?)?;
-            Ok(Resolved::WorkerArray(Box::new(WorkerArray { script, count })))
+            let script = Box::new(worker_script(allocation, &around.remote(client)?)?);
+            Ok(SlurmTask::Array { script, count })
         }
     }
 }
 
-/// Resolves `workers slurm`.
+/// Resolves `workers slurm`; `client` is what stands before the operation.
 pub(super) fn scaling(
     arguments: ScalingArguments,
-    coordinator: Remote,
-) -> Result<Resolved, CommandFailure> {
+    around: &Surroundings,
+    client: ClientArguments,
+) -> Result<SlurmTask, CommandFailure> {
     let ScalingArguments { min, max, backlog, interval, dry_run, .. } = arguments;
+    let coordinator = around.remote(arguments.client.or(client))?;
     if min > max {
         return Err(CommandFailure::bad_input(anyhow!(
             "--min {min} must not be larger than --max {max}"
@@ -70,7 +84,7 @@ pub(super) fn scaling(
         interval: Duration::from_secs(interval.into()),
         coordinator,
     });
-    Ok(Resolved::ScaleWorkers { plan, dry_run })
+    Ok(SlurmTask::Follow { plan, dry_run })
 }
 
 fn job_script(arguments: JobScriptArguments) -> Result<JobScript, CommandFailure> {
