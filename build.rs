@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// Files and directories of the program's source. A change in any of them runs this script again, so
 /// that it notices a modified tree.
-const SOURCES: [&str; 32] = [
+const SOURCES: [&str; 34] = [
     ".cargo",
     "Cargo.lock",
     "Cargo.toml",
@@ -22,6 +22,8 @@ const SOURCES: [&str; 32] = [
     "files/src",
     "http/Cargo.toml",
     "http/src",
+    "local/Cargo.toml",
+    "local/src",
     "proto/Cargo.toml",
     "proto/build.rs",
     "proto/osteon",

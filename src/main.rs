@@ -20,15 +20,14 @@ mod log_filter;
 mod logging;
 mod manual;
 mod new_files;
-mod observations;
 mod output;
 mod program;
 mod progress;
 mod resolved;
 #[cfg(test)]
+#[path = "../client/src/sample_result.rs"]
 mod sample_result;
 mod signals;
-mod simulation_directory;
 mod surroundings;
 mod telemetry;
 mod unsearched_groups;

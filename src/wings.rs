@@ -62,7 +62,7 @@ pub(crate) enum JobWing {
     Report(report::ReportArguments),
     /// Serve a job's model to samplers and other programs by the UM-Bridge protocol, until interrupted
     #[cfg(feature = "umbridge")]
-    Umbridge(umbridge::UmbridgeArguments),
+    Umbridge(Box<umbridge::UmbridgeArguments>),
 }
 
 /// Commands about a cluster.
@@ -92,7 +92,7 @@ impl JobWing {
             #[cfg(feature = "report")]
             Self::Report(arguments) => Ok(Box::new(arguments)),
             #[cfg(feature = "umbridge")]
-            Self::Umbridge(arguments) => umbridge::resolve(arguments, around),
+            Self::Umbridge(arguments) => umbridge::resolve(*arguments, around),
         }
     }
 }

@@ -1,12 +1,10 @@
 //! `report`: results as a page with figures.
 
-mod directory;
-
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use osteon_client::report_directory::{self, REPORT};
 
-use self::directory::REPORT;
 use super::{Performance, WingCommand};
 use crate::exit_status::{CommandFailure, ExitStatus};
 use crate::progress::say;
@@ -38,7 +36,10 @@ impl ReportOption {
     /// If the results cannot be read, or the report cannot be written.
     pub(crate) fn write(&self, directory: Option<&Path>) -> Result<(), CommandFailure> {
         let Some(directory) = directory.filter(|_| self.report) else { return Ok(()) };
-        let page = directory::write(&directory.join(REPORT), &[directory::read(directory)?])?;
+        let page = report_directory::write(
+            &directory.join(REPORT),
+            &[report_directory::read(directory)?],
+        )?;
         say(&format!("report: {page}"));
         Ok(())
     }
@@ -57,9 +58,9 @@ fn report(arguments: &ReportArguments) -> Result<ExitStatus, CommandFailure> {
         (Some(out), _) => out.clone(),
         (None, first) => first.map(|first| first.join(REPORT)).unwrap_or_default(),
     };
-    let runs = directories.iter().map(|directory| directory::read(directory));
+    let runs = directories.iter().map(|directory| report_directory::read(directory));
     let runs = runs.collect::<Result<Vec<_>, _>>()?;
-    let page = directory::write(&out, &runs)?;
+    let page = report_directory::write(&out, &runs)?;
     say(&page);
     Ok(ExitStatus::Done)
 }

@@ -7,12 +7,12 @@ use serde_json::Value;
 
 /// Returns a complete result of an identification, in which the keys of `partial` are replaced.
 pub(crate) fn identification(partial: &str) -> ResultFile {
-    filled(include_str!("../fuzz/corpus/results/identification.json"), partial)
+    filled(include_str!("../../fuzz/corpus/results/identification.json"), partial)
 }
 
 /// Returns a complete result of a propagation, in which the keys of `partial` are replaced.
 pub(crate) fn propagation(partial: &str) -> ResultFile {
-    filled(include_str!("../fuzz/corpus/results/propagation.json"), partial)
+    filled(include_str!("../../fuzz/corpus/results/propagation.json"), partial)
 }
 
 /// Returns a posterior as a result has it.

@@ -20,7 +20,7 @@ const SAMPLES_MAX: usize = 1024;
 
 /// How much is computed for an estimate.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Effort {
+pub struct Effort {
     /// Number of realizations at the start before any other.
     pub(super) first: u64,
     /// Number of points of the box.
@@ -33,11 +33,9 @@ pub(crate) struct Effort {
 
 impl Effort {
     /// What a user waits for: some tenths of a second for usual jobs.
-    pub(crate) const THOROUGH: Self =
-        Self { first: 16, points: 13, rounds: 8, limit: milliseconds(2000) };
+    pub const THOROUGH: Self = Self { first: 16, points: 13, rounds: 8, limit: milliseconds(2000) };
     /// What is not noticed before a run: a few ms.
-    pub(crate) const BRIEF: Self =
-        Self { first: 6, points: 0, rounds: 0, limit: milliseconds(500) };
+    pub const BRIEF: Self = Self { first: 6, points: 0, rounds: 0, limit: milliseconds(500) };
 }
 
 /// The time of one realization.

@@ -8,29 +8,29 @@ use std::io::Write;
 use std::path::Path;
 
 use anyhow::anyhow;
-use osteon_client::result_files::{RESULT, ResultFiles, ResultOrigin};
-use osteon_client::results_directory::{CASE, JOB, ResultsDirectory, difference, read_named_file};
 use osteon_common::case::Case;
+use osteon_common::version::Program;
 use osteon_common::visible;
 use osteon_files::case_file;
 use osteon_files::document::Format;
 
-use crate::exit_status::CommandFailure;
-use crate::program;
+use crate::result_files::{RESULT, ResultFiles, ResultOrigin};
+use crate::results_directory::{CASE, JOB, ResultsDirectory, difference, read_named_file};
+use crate::run_error::RunError;
 
 /// The file of the traces.
-pub(crate) const TRACES: &str = "traces.csv";
+pub const TRACES: &str = "traces.csv";
 /// Start of the first line of `case.toml`; the options of the traces follow.
 const COMMAND: &str = "# osteon simulate case.toml";
 
 /// The case and options to which a simulation's directory belongs.
-pub(crate) struct SimulationKey<'a> {
+pub struct SimulationKey<'a> {
     /// The case.
-    pub(crate) case: &'a Case,
+    pub case: &'a Case,
     /// Duration of the traces, s.
-    pub(crate) duration: f64,
+    pub duration: f64,
     /// Time step of the traces, s.
-    pub(crate) time_step: f64,
+    pub time_step: f64,
 }
 
 impl SimulationKey<'_> {
@@ -65,7 +65,7 @@ impl SimulationKey<'_> {
     /// # Errors
     /// Bad input if another case, other traces, or a job was computed there; failed if it cannot be
     /// read.
-    pub(crate) fn refuse_other(&self, directory: &Path) -> Result<(), CommandFailure> {
+    pub fn refuse_other(&self, directory: &Path) -> Result<(), RunError> {
         let there = |name: &str| directory.join(name).symlink_metadata().is_ok();
         let shown = visible::path(directory);
         let stored = read_named_file(&directory.join(CASE))?;
@@ -82,38 +82,33 @@ impl SimulationKey<'_> {
                 }
             },
         };
-        Err(CommandFailure::bad_input(anyhow!("{why}; choose another --out directory")))
+        Err(RunError::bad_input(anyhow!("{why}; choose another --out directory")))
     }
 
-    /// Writes all files; `print` writes the traces.
+    /// Writes all files; `print` writes the traces. The result was computed by `program`.
     ///
     /// # Errors
     /// Same as [`refuse_other`](Self::refuse_other); also failed if another process writes there,
     /// or if the directory cannot be written.
-    pub(crate) fn write(
+    pub fn write(
         &self,
         directory: &Path,
+        program: &Program,
         result: &str,
         print: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-    ) -> Result<(), CommandFailure> {
+    ) -> Result<(), RunError> {
         let _held = ResultsDirectory::open(directory)?;
         // Another process may have written between the first check and the lock.
         self.refuse_other(directory)?;
-        let program = program::current();
-        let origin = ResultOrigin {
-            kind: "simulation",
-            program: &program,
-            digest: None,
-            seed: None,
-            integrity: None,
-        };
+        let origin =
+            ResultOrigin { kind: "simulation", program, digest: None, seed: None, integrity: None };
         let write = || {
             let mut files = ResultFiles::begin(directory)?;
             files.write(CASE, &self.text())?;
             files.write_by(TRACES, print)?;
             files.finish(result, &origin)
         };
-        write().map_err(CommandFailure::Failed)
+        write().map_err(RunError::Failed)
     }
 }
 
@@ -130,7 +125,7 @@ fn traces_of(stored: &str) -> Option<[f64; 2]> {
 mod tests {
     use super::*;
 
-    const CASE_TEXT: &str = include_str!("../examples/cases/A.toml");
+    const CASE_TEXT: &str = include_str!("../../examples/cases/A.toml");
 
     #[test]
     fn the_same_simulation_is_known_in_other_words() {

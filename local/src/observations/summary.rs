@@ -5,31 +5,31 @@ use osteon_common::settings::Extremum;
 
 use super::Observation;
 
-/// ObservationSummary of the realizations at one point.
+/// Summary of the realizations at one point.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ObservationSummary {
+pub struct ObservationSummary {
     /// The extremum whose velocity is the other one.
-    pub(crate) other_extremum: Extremum,
+    pub other_extremum: Extremum,
     /// Number of realizations.
-    pub(crate) realizations: u64,
+    pub realizations: u64,
     /// Realizations without a velocity.
-    pub(crate) failures: FailureCounts,
+    pub failures: FailureCounts,
     /// Velocity (m/s), other velocity (m/s), decay (dB/cm) and centre frequency (Hz).
-    pub(crate) columns: [ObservableMoments; 4],
+    pub columns: [ObservableMoments; 4],
 }
 
 /// One observable over the realizations that have it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ObservableMoments {
+pub struct ObservableMoments {
     /// Number of realizations that have it.
-    pub(crate) count: u64,
+    pub count: u64,
     /// Mean; `None` if no realization has it.
-    pub(crate) mean: Option<f64>,
+    pub mean: Option<f64>,
     /// Standard deviation, the sum of squares divided by one less than the count; `None` of fewer
     /// than two.
-    pub(crate) standard_deviation: Option<f64>,
+    pub standard_deviation: Option<f64>,
     /// Coefficient of correlation with the velocity; `None` if one of both does not vary.
-    pub(crate) correlation: Option<f64>,
+    pub correlation: Option<f64>,
 }
 
 impl ObservationSummary {
@@ -54,7 +54,7 @@ impl ObservationSummary {
     }
 
     /// Returns whether any realization has a velocity.
-    pub(crate) fn has_velocity(&self) -> bool {
+    pub fn has_velocity(&self) -> bool {
         self.columns[0].count > 0
     }
 }

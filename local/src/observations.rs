@@ -4,24 +4,21 @@ mod summary;
 
 use std::fmt::Write as _;
 
-use indicatif::{ProgressBar, ProgressStyle};
 use osteon_common::job::JobSpecification;
 use osteon_common::outcome::{FailureKind, Outcome};
 use osteon_common::parameters::Point;
+use osteon_common::realization::PointError;
 use osteon_common::settings::Extremum;
 use osteon_solver::{FirstSignal, Isa, ObservedRealization, Solver, Workspace};
+use rayon::ThreadPoolBuildError;
 use rayon::prelude::*;
+use thiserror::Error;
 
-use crate::exit_status::CommandFailure;
-
-pub(crate) use self::summary::{ObservableMoments, ObservationSummary};
-
-/// Progress on a terminal.
-const BAR: &str = "{bar:30} {pos} of {len} realizations, {eta} left";
+pub use self::summary::{ObservableMoments, ObservationSummary};
 
 /// The realizations at one point, in index order.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Observations {
+pub struct Observations {
     other_extremum: Extremum,
     rows: Vec<Observation>,
 }
@@ -38,29 +35,38 @@ struct Observation {
     center_frequency: Option<f64>,
 }
 
+/// Error when realizations cannot be observed.
+#[derive(Debug, Error)]
+pub enum ObservationError {
+    /// The point has no ensemble.
+    #[error(transparent)]
+    Point(#[from] PointError),
+    /// No threads can be started.
+    #[error(transparent)]
+    Threads(#[from] ThreadPoolBuildError),
+}
+
 impl Observations {
     /// Computes all realizations of the job at `point`. They are the same for every number of threads.
+    /// `done` is called after each.
     ///
     /// # Errors
     /// If the point has no ensemble, or if no threads can be started.
-    pub(crate) fn compute(
+    pub fn compute(
         specification: &JobSpecification,
         point: &Point,
         isa: Isa,
         threads: usize,
-    ) -> Result<Self, CommandFailure> {
-        let ensemble = specification.ensemble(point).map_err(CommandFailure::bad_input)?;
+        done: impl Fn() + Sync,
+    ) -> Result<Self, ObservationError> {
+        let ensemble = specification.ensemble(point)?;
         let setup = point.setup(&specification.setup);
         let solver = Solver::with_isa(&setup, isa);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(CommandFailure::failed)?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         let count = specification.monte_carlo.realizations;
-        let style = ProgressStyle::with_template(BAR).map_err(CommandFailure::failed)?;
-        // Hidden unless stderr is a terminal.
-        let bar = ProgressBar::new(count).with_style(style);
         let observe = |workspace: &mut Workspace, index| {
             let observed = solver.observed_realization(&ensemble, index, workspace);
-            bar.inc(1);
+            done();
             match observed {
                 Ok(observed) => Observation::from(&observed),
                 Err(kind) => Observation::failed(kind),
@@ -68,12 +74,11 @@ impl Observations {
         };
         let rows = pool
             .install(|| (0..count).into_par_iter().map_init(Workspace::default, observe).collect());
-        bar.finish_and_clear();
         Ok(Self { other_extremum: setup.picking.extremum.other(), rows })
     }
 
     /// Returns one row for each realization, with a heading.
-    pub(crate) fn to_csv(&self) -> String {
+    pub fn to_csv(&self) -> String {
         let mut text = "index,velocity,other_velocity,decay,center_frequency,failure\n".to_owned();
         for (index, row) in self.rows.iter().enumerate() {
             let cell = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{v:?}"));
@@ -86,7 +91,7 @@ impl Observations {
     }
 
     /// Returns the summary.
-    pub(crate) fn summary(&self) -> ObservationSummary {
+    pub fn summary(&self) -> ObservationSummary {
         ObservationSummary::new(self.other_extremum, &self.rows)
     }
 }
