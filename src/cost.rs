@@ -85,6 +85,6 @@ mod tests {
         let many = remark(&cost(Some(0.25e-3), 1_000_000)).unwrap();
         assert_eq!(many, "the job takes up to about 3.5 h; see `osteon check`");
         let unknown = remark(&cost(None, 200)).unwrap();
-        assert!(unknown.starts_with("a realization takes more than 2 s"), "{unknown}");
+        assert!(unknown.starts_with("a realization takes more than 2.0 s"), "{unknown}");
     }
 }

@@ -21,6 +21,7 @@ mod logging;
 mod manual;
 mod new_files;
 mod output;
+mod process_context;
 mod program;
 mod progress;
 mod resolved;
@@ -28,7 +29,6 @@ mod resolved;
 #[path = "../client/src/sample_result.rs"]
 mod sample_result;
 mod signals;
-mod surroundings;
 mod telemetry;
 mod unsearched_groups;
 mod user;

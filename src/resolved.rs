@@ -20,7 +20,7 @@ use crate::arguments::{
 };
 use crate::doctor::Patient;
 use crate::exit_status::CommandFailure;
-use crate::surroundings::{Locating, RunLocation, Surroundings, WORKERS_DEFAULT};
+use crate::process_context::{Locating, ProcessContext, RunLocation, WORKERS_DEFAULT};
 use crate::wings::{ReportOption, WingCommand};
 
 /// Format of the output on stdout.
@@ -187,23 +187,25 @@ impl Resolved {
     /// # Errors
     /// When the environment holds something that cannot be meant.
     pub(crate) fn from_arguments(arguments: Arguments) -> Result<Self, CommandFailure> {
-        let around = &Surroundings::from_process()?;
-        let isa = Surroundings::isa;
+        let context = &ProcessContext::from_process()?;
+        let isa = ProcessContext::isa;
         Ok(match arguments.command {
-            Command::Identify(arguments) => of_run(JobKind::Identification, arguments, around)?,
-            Command::Propagate(arguments) => of_run(JobKind::Propagation, arguments, around)?,
+            Command::Identify(arguments) => {
+                run_command(JobKind::Identification, arguments, context)?
+            }
+            Command::Propagate(arguments) => run_command(JobKind::Propagation, arguments, context)?,
             Command::Simulate(arguments) => Self::Simulate { arguments, isa: isa()? },
             Command::Check(arguments) => {
-                Self::Check { arguments, isa: isa()?, cores: around.cores }
+                Self::Check { arguments, isa: isa()?, cores: context.cores }
             }
             Command::Draw(arguments) => Self::Draw(arguments),
             Command::Observe(arguments) => {
-                let threads = arguments.threads.unwrap_or(around.cores);
+                let threads = arguments.threads.unwrap_or(context.cores);
                 Self::Observe { arguments, isa: isa()?, threads }
             }
-            Command::JobWing(command) => Self::Wing(command.resolve(around)?),
+            Command::JobWing(command) => Self::Wing(command.resolve(context)?),
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
-            Command::Worker(arguments) => resolve_worker(arguments, around, isa()?)?,
+            Command::Worker(arguments) => resolve_worker(arguments, context, isa()?)?,
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
             Command::Init(arguments) => Self::Init(arguments),
@@ -211,25 +213,25 @@ impl Resolved {
             Command::Materials(arguments) => Self::Materials(arguments),
             Command::Doctor(DoctorArguments { store, client, json }) => {
                 let named =
-                    client.coordinator.is_some() || around.environment.coordinator()?.is_some();
-                let coordinator = named.then(|| around.remote(client)).transpose()?;
+                    client.coordinator.is_some() || context.environment.coordinator()?.is_some();
+                let coordinator = named.then(|| context.remote(client)).transpose()?;
                 let patient = Patient { store, coordinator, isa: isa()? };
                 Self::Doctor { patient, format: format(json) }
             }
             Command::Completions(arguments) => Self::Completions(arguments),
             Command::Man(arguments) => Self::Man(arguments),
-            Command::Job(command) => of_job(command, around)?,
-            Command::Earlier(command) => of_job(command.into(), around)?,
-            Command::Workers(arguments) => resolve_workers(arguments, around)?,
-            Command::ClusterWing(command) => Self::Wing(command.resolve(around)?),
+            Command::Job(command) => job_command(command, context)?,
+            Command::Earlier(command) => job_command(command.into(), context)?,
+            Command::Workers(arguments) => resolve_workers(arguments, context)?,
+            Command::ClusterWing(command) => Self::Wing(command.resolve(context)?),
             Command::Health(HealthArguments { client, timeout, json }) => Self::Health {
-                coordinator: around.remote(client)?,
+                coordinator: context.remote(client)?,
                 limit: Duration::from_secs_f64(timeout),
                 format: format(json),
             },
             Command::Backup(BackupArguments { directory, client, json }) => Self::Backup {
                 directory,
-                coordinator: around.remote(client)?,
+                coordinator: context.remote(client)?,
                 format: format(json),
             },
         })
@@ -259,15 +261,15 @@ pub(crate) fn format(json: bool) -> OutputFormat {
     if json { OutputFormat::Json } else { OutputFormat::Text }
 }
 
-fn of_run(
+fn run_command(
     kind: JobKind,
     arguments: RunArguments,
-    around: &Surroundings,
+    context: &ProcessContext,
 ) -> Result<Resolved, CommandFailure> {
-    let run = resolve_run(kind, arguments, around)?;
+    let run = resolve_run(kind, arguments, context)?;
     // Workers read the variable again, but an invalid value is reported here, at once.
     let isa = match run.location {
-        RunLocation::Local { .. } => Some(Surroundings::isa()?),
+        RunLocation::Local { .. } => Some(ProcessContext::isa()?),
         RunLocation::Coordinator(_) => None,
     };
     Ok(Resolved::Run { run, isa })
@@ -276,7 +278,7 @@ fn of_run(
 fn resolve_run(
     kind: JobKind,
     arguments: RunArguments,
-    around: &Surroundings,
+    context: &ProcessContext,
 ) -> Result<Run, CommandFailure> {
     let RunArguments { job, threads, coordinator, credentials, out, report, .. } = arguments;
     let page = arguments.page.address();
@@ -285,7 +287,7 @@ fn resolve_run(
     Ok(Run {
         kind,
         job,
-        location: around.locate(Locating { workers, threads, coordinator, credentials })?,
+        location: context.locate(Locating { workers, threads, coordinator, credentials })?,
         name: arguments.name.unwrap_or_default(),
         out,
         report,
@@ -296,14 +298,14 @@ fn resolve_run(
     })
 }
 
-fn of_job(command: JobCommand, around: &Surroundings) -> Result<Resolved, CommandFailure> {
-    let coordinator = around.remote(command.client())?;
+fn job_command(command: JobCommand, context: &ProcessContext) -> Result<Resolved, CommandFailure> {
+    let coordinator = context.remote(command.client())?;
     Ok(Resolved::Job { command, coordinator })
 }
 
 fn resolve_workers(
     arguments: WorkersArguments,
-    around: &Surroundings,
+    context: &ProcessContext,
 ) -> Result<Resolved, CommandFailure> {
     let WorkersArguments { command, client, json } = arguments;
     let (command, client, json) = match command {
@@ -316,19 +318,19 @@ fn resolve_workers(
             (Some(WorkersOperation::Unban { host: unban.host }), unban.client.or(client), json)
         }
         Some(WorkersCommand::Wing(command)) => {
-            return Ok(Resolved::Wing(command.resolve(around, client)?));
+            return Ok(Resolved::Wing(command.resolve(context, client)?));
         }
     };
-    let (coordinator, format) = (around.remote(client)?, format(json));
+    let (coordinator, format) = (context.remote(client)?, format(json));
     Ok(Resolved::Workers { command, coordinator, format })
 }
 
 fn resolve_worker(
     arguments: WorkerArguments,
-    around: &Surroundings,
+    context: &ProcessContext,
     isa: Isa,
 ) -> Result<Resolved, CommandFailure> {
-    let environment = &around.environment;
+    let environment = &context.environment;
     let endpoint = environment.needed(arguments.coordinator)?;
     let (files, unused) = environment.files(arguments.credentials.into(), &endpoint);
     let config = WorkerConfig {
@@ -336,7 +338,7 @@ fn resolve_worker(
         endpoint,
         credentials: Credentials::default(),
         host: arguments.host.or_else(|| environment.host()),
-        threads: arguments.threads.unwrap_or(around.cores),
+        threads: arguments.threads.unwrap_or(context.cores),
         isa,
         give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),
         time_limit: arguments.time_limit.map(Duration::from_secs_f64),

@@ -8,7 +8,7 @@ use clap::Subcommand;
 
 use crate::arguments::ClientArguments;
 use crate::exit_status::{CommandFailure, ExitStatus};
-use crate::surroundings::Surroundings;
+use crate::process_context::ProcessContext;
 
 #[cfg(any(feature = "live", feature = "umbridge"))]
 mod host_name;
@@ -87,12 +87,12 @@ pub(crate) enum WorkersWing {
 impl JobWing {
     /// Resolves the arguments.
     #[cfg_attr(not(feature = "umbridge"), expect(unused_variables, reason = "a report needs none"))]
-    pub(crate) fn resolve(self, around: &Surroundings) -> ResolvedWing {
+    pub(crate) fn resolve(self, context: &ProcessContext) -> ResolvedWing {
         match self {
             #[cfg(feature = "report")]
             Self::Report(arguments) => Ok(Box::new(arguments)),
             #[cfg(feature = "umbridge")]
-            Self::Umbridge(arguments) => umbridge::resolve(*arguments, around),
+            Self::Umbridge(arguments) => umbridge::resolve(*arguments, context),
         }
     }
 }
@@ -100,10 +100,10 @@ impl JobWing {
 impl ClusterWing {
     /// Resolves the arguments.
     #[cfg_attr(not(feature = "slurm"), expect(unused_variables, reason = "there is no command"))]
-    pub(crate) fn resolve(self, around: &Surroundings) -> ResolvedWing {
+    pub(crate) fn resolve(self, context: &ProcessContext) -> ResolvedWing {
         match self {
             #[cfg(feature = "slurm")]
-            Self::Slurm(arguments) => slurm::resolve(arguments, around),
+            Self::Slurm(arguments) => slurm::resolve(arguments, context),
         }
     }
 }
@@ -111,10 +111,10 @@ impl ClusterWing {
 impl WorkersWing {
     /// Resolves the arguments; `client` is what stands before the operation.
     #[cfg_attr(not(feature = "slurm"), expect(unused_variables, reason = "there is no operation"))]
-    pub(crate) fn resolve(self, around: &Surroundings, client: ClientArguments) -> ResolvedWing {
+    pub(crate) fn resolve(self, context: &ProcessContext, client: ClientArguments) -> ResolvedWing {
         match self {
             #[cfg(feature = "slurm")]
-            Self::Slurm(arguments) => slurm::resolve_scaling(*arguments, around, client),
+            Self::Slurm(arguments) => slurm::resolve_scaling(*arguments, context, client),
         }
     }
 }

@@ -94,7 +94,7 @@ mod tests {
     const REQUEST: &str = "GET / HTTP/1.1\r\nHost: x\r\n\r\n";
 
     /// Sends something, and reads until the connection ends; returns what was read, and the time that it took.
-    async fn ended(bounds: ConnectionBounds, sent: &str) -> (String, Duration) {
+    async fn exchange(bounds: ConnectionBounds, sent: &str) -> (String, Duration) {
         let (near, mut far) = duplex(1 << 16);
         let router = Router::new().route("/", get(async || "here"));
         let answering = tokio::spawn(bounds.answer(near, router));
@@ -109,7 +109,7 @@ mod tests {
     async fn silence_ends_a_connection() {
         let bounds = ConnectionBounds { header: LONG, whole: None, keep_alive: true };
         for begun in ["", "GET / HT", REQUEST] {
-            let (read, time) = ended(bounds, begun).await;
+            let (read, time) = exchange(bounds, begun).await;
             assert_eq!(read.ends_with("here"), begun == REQUEST, "{read}");
             assert!(time >= LONG && time < LONG * 2, "{time:?}");
         }
@@ -118,9 +118,9 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn one_request_and_a_whole_time_are_enough_where_that_is_the_rule() {
         let bounds = ConnectionBounds { header: LONG, whole: Some(LONG / 3), keep_alive: false };
-        let (read, time) = ended(bounds, REQUEST).await;
+        let (read, time) = exchange(bounds, REQUEST).await;
         assert!(read.ends_with("here") && time < Duration::from_secs(1), "{read} {time:?}");
-        let (read, time) = ended(bounds, "GET / HT").await;
+        let (read, time) = exchange(bounds, "GET / HT").await;
         assert!(read.is_empty() && time >= LONG / 3 && time < LONG, "{read} {time:?}");
     }
 
@@ -128,7 +128,7 @@ mod tests {
     async fn a_long_header_is_refused() {
         let bounds = ConnectionBounds { header: LONG, whole: None, keep_alive: true };
         let header = "x".repeat(HEADER_BYTES_MAX);
-        let (read, _) = ended(bounds, &format!("GET / HTTP/1.1\r\nX: {header}\r\n\r\n")).await;
+        let (read, _) = exchange(bounds, &format!("GET / HTTP/1.1\r\nX: {header}\r\n\r\n")).await;
         assert!(read.starts_with("HTTP/1.1 431 "), "{read}");
     }
 }

@@ -6,29 +6,11 @@
 mod measurement;
 mod places;
 
-use std::time::Duration;
-
 use osteon_common::job::JobSpecification;
-use osteon_common::parameters::Point;
 use osteon_search::ExpectedEvaluations;
 use osteon_solver::Isa;
 
-pub use self::measurement::Effort;
-
-/// Times of the realizations of one point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlaceCost {
-    /// The point.
-    pub point: Point,
-    /// Mean time of a realization, s.
-    pub mean_s: f64,
-    /// Median time, s.
-    pub median_s: f64,
-    /// Number of realizations measured, at least one.
-    pub measured: usize,
-    /// Number of them that failed.
-    pub failed: usize,
-}
+pub use self::measurement::{Effort, PlaceCost};
 
 /// The estimated cost of a job.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,11 +91,6 @@ impl JobCost {
         let share = rounds as f64 / self.realizations.max(1) as f64;
         Some(self.processor_s()?.map(|seconds| seconds * share))
     }
-}
-
-/// Returns a limit of time.
-const fn milliseconds(count: u64) -> Duration {
-    Duration::from_millis(count)
 }
 
 #[cfg(test)]

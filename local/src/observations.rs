@@ -1,18 +1,20 @@
 //! All observables of the realizations at one point of a job.
 
+mod observation;
 mod summary;
 
 use std::fmt::Write as _;
 
 use osteon_common::job::JobSpecification;
-use osteon_common::outcome::{FailureKind, Outcome};
 use osteon_common::parameters::Point;
 use osteon_common::realization::PointError;
 use osteon_common::settings::Extremum;
-use osteon_solver::{FirstSignal, Isa, ObservedRealization, Solver, Workspace};
+use osteon_solver::{Isa, Solver, Workspace};
 use rayon::ThreadPoolBuildError;
 use rayon::prelude::*;
 use thiserror::Error;
+
+use self::observation::Observation;
 
 pub use self::summary::{ObservableMoments, ObservationSummary};
 
@@ -21,18 +23,6 @@ pub use self::summary::{ObservableMoments, ObservationSummary};
 pub struct Observations {
     other_extremum: Extremum,
     rows: Vec<Observation>,
-}
-
-/// One realization. Without a velocity, the other observables are `None`, too.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Observation {
-    outcome: Outcome,
-    /// Velocity of the extremum that the job does not pick, m/s.
-    other_velocity: Option<f64>,
-    /// dB/cm.
-    decay: Option<f64>,
-    /// Hz.
-    center_frequency: Option<f64>,
 }
 
 /// Error when realizations cannot be observed.
@@ -93,29 +83,6 @@ impl Observations {
     /// Returns the summary.
     pub fn summary(&self) -> ObservationSummary {
         ObservationSummary::new(self.other_extremum, &self.rows)
-    }
-}
-
-impl Observation {
-    fn failed(kind: FailureKind) -> Self {
-        Self { outcome: Err(kind), other_velocity: None, decay: None, center_frequency: None }
-    }
-
-    /// Returns velocity, other velocity, decay and frequency.
-    fn values(&self) -> [Option<f64>; 4] {
-        [self.outcome.ok(), self.other_velocity, self.decay, self.center_frequency]
-    }
-}
-
-impl From<&ObservedRealization> for Observation {
-    fn from(observed: &ObservedRealization) -> Self {
-        let FirstSignal { other_velocity, decay, center_frequency, .. } = &observed.signal;
-        Self {
-            outcome: Ok(observed.velocity),
-            other_velocity: other_velocity.as_ref().ok().copied(),
-            decay: Some(*decay),
-            center_frequency: *center_frequency,
-        }
     }
 }
 

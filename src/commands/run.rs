@@ -20,10 +20,10 @@ use osteon_solver::Isa;
 use crate::arguments::VerbosityArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, Interruption, stdout_failure};
 use crate::output::{self, Detail, ShownResult};
+use crate::process_context::RunLocation;
 use crate::progress::{Progress, ShownProgress, say};
 use crate::resolved::Run;
 use crate::signals;
-use crate::surroundings::RunLocation;
 use crate::user;
 use crate::{cost, program, unsearched_groups, warnings};
 

@@ -13,17 +13,17 @@ fn run(line: &str, cores: u32, coordinator: Option<&str>) -> Run {
     let (Command::Identify(arguments) | Command::Propagate(arguments)) = command else {
         panic!("{line} is no run");
     };
-    resolve_run(JobKind::Identification, arguments, &around(coordinator, cores)).unwrap()
+    resolve_run(JobKind::Identification, arguments, &context(coordinator, cores)).unwrap()
 }
 
 /// An environment with this coordinator, and files for it.
-fn around(coordinator: Option<&str>, cores: u32) -> Surroundings {
+fn context(coordinator: Option<&str>, cores: u32) -> ProcessContext {
     let files = ["OSTEON_TLS_CA", "OSTEON_TOKEN_FILE"];
     let environment = Environment::read(|name| match name {
         "OSTEON_COORDINATOR" => coordinator.map(OsString::from),
         name => files.contains(&name).then(|| OsString::from("file")),
     });
-    Surroundings { environment: environment.unwrap(), cores }
+    ProcessContext { environment: environment.unwrap(), cores }
 }
 
 fn here(line: &str, cores: u32) -> (u32, u32) {
@@ -65,7 +65,7 @@ fn an_environment_that_is_no_address_is_bad_input() {
         panic!("no run");
     };
     let failure =
-        resolve_run(JobKind::Identification, arguments, &around(Some("nowhere"), 2)).unwrap_err();
+        resolve_run(JobKind::Identification, arguments, &context(Some("nowhere"), 2)).unwrap_err();
     assert_eq!(failure.exit_code(), 2);
     assert!(failure.to_string().contains("OSTEON_COORDINATOR"), "{failure}");
     assert!(failure.to_string().contains("`nowhere`"), "{failure}");

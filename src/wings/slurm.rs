@@ -17,9 +17,9 @@ use super::{Performance, ResolvedWing, WingCommand};
 use crate::arguments::ClientArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
+use crate::process_context::ProcessContext;
 use crate::progress::say;
 use crate::resolved::OutputFormat;
-use crate::surroundings::Surroundings;
 use crate::user;
 
 pub(super) use self::arguments::{ScalingArguments, SlurmArguments};
@@ -28,17 +28,17 @@ pub(super) use self::arguments::{ScalingArguments, SlurmArguments};
 const ARRAY_NAME: &str = "osteon-worker";
 
 /// Resolves `slurm` and its subcommands.
-pub(super) fn resolve(arguments: SlurmArguments, around: &Surroundings) -> ResolvedWing {
-    Ok(Box::new(resolved::scripts(arguments, around)?))
+pub(super) fn resolve(arguments: SlurmArguments, context: &ProcessContext) -> ResolvedWing {
+    Ok(Box::new(resolved::scripts(arguments, context)?))
 }
 
 /// Resolves `workers slurm`.
 pub(super) fn resolve_scaling(
     arguments: ScalingArguments,
-    around: &Surroundings,
+    context: &ProcessContext,
     client: ClientArguments,
 ) -> ResolvedWing {
-    Ok(Box::new(resolved::scaling(arguments, around, client)?))
+    Ok(Box::new(resolved::scaling(arguments, context, client)?))
 }
 
 impl WingCommand for SlurmTask {

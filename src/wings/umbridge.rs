@@ -20,10 +20,10 @@ use self::resolved::ModelService;
 use super::{Performance, ResolvedWing, WingCommand};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
+use crate::process_context::{ProcessContext, RunLocation};
 use crate::progress::say;
 use crate::resolved::OutputFormat;
 use crate::signals;
-use crate::surroundings::{RunLocation, Surroundings};
 use crate::user;
 use crate::{program, warnings};
 
@@ -33,8 +33,8 @@ pub(super) use self::arguments::UmbridgeArguments;
 const KEPT: Duration = Duration::from_secs(60);
 
 /// Resolves the arguments.
-pub(super) fn resolve(arguments: UmbridgeArguments, around: &Surroundings) -> ResolvedWing {
-    Ok(Box::new(resolved::service(arguments, around)?))
+pub(super) fn resolve(arguments: UmbridgeArguments, context: &ProcessContext) -> ResolvedWing {
+    Ok(Box::new(resolved::service(arguments, context)?))
 }
 
 impl WingCommand for ModelService {

@@ -14,7 +14,7 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
         bail!("usage: cargo xtask test wings");
     }
     let manifest = fs::read_to_string(root().join("Cargo.toml"))?;
-    let wings = by_default(&manifest).context("Cargo.toml lists no default features")?;
+    let wings = default_features(&manifest).context("Cargo.toml lists no default features")?;
     for absent in wings.iter().map(Some).chain([None]) {
         let others = wings.iter().filter(|wing| absent.is_some_and(|absent| absent != *wing));
         let features = others.copied().collect::<Vec<_>>().join(",");
@@ -33,7 +33,7 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
 }
 
 /// Returns the features that a manifest has by default, on one line.
-fn by_default(manifest: &str) -> Option<Vec<&str>> {
+fn default_features(manifest: &str) -> Option<Vec<&str>> {
     let list = manifest.lines().find_map(|line| line.strip_prefix("default = ["))?;
     let names = list.trim_end_matches(']').split(',');
     Some(names.map(|name| name.trim().trim_matches('"')).collect())
@@ -46,6 +46,6 @@ mod tests {
     #[test]
     fn wings_are_the_features_by_default() {
         let manifest = "[features]\ndefault = [\"live\", \"slurm\"]\nlive = []\n";
-        assert_eq!(by_default(manifest), Some(vec!["live", "slurm"]));
+        assert_eq!(default_features(manifest), Some(vec!["live", "slurm"]));
     }
 }

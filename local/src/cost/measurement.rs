@@ -8,8 +8,6 @@ use osteon_common::realization::Ensemble;
 use osteon_solver::{Isa, Solver, Workspace};
 use tokio::sync::mpsc;
 
-use super::{PlaceCost, milliseconds};
-
 /// A realization that takes this long, s, is not computed a second time.
 const ONCE_S: f64 = 0.02;
 /// Realizations at the start for each one at a point of the box: few realizations take much longer than
@@ -33,9 +31,26 @@ pub struct Effort {
 
 impl Effort {
     /// What a user waits for: some tenths of a second for usual jobs.
-    pub const THOROUGH: Self = Self { first: 16, points: 13, rounds: 8, limit: milliseconds(2000) };
+    pub const THOROUGH: Self =
+        Self { first: 16, points: 13, rounds: 8, limit: Duration::from_millis(2000) };
     /// What is not noticed before a run: a few ms.
-    pub const BRIEF: Self = Self { first: 6, points: 0, rounds: 0, limit: milliseconds(500) };
+    pub const BRIEF: Self =
+        Self { first: 6, points: 0, rounds: 0, limit: Duration::from_millis(500) };
+}
+
+/// Times of the realizations of one point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaceCost {
+    /// The point.
+    pub point: Point,
+    /// Mean time of a realization, s.
+    pub mean_s: f64,
+    /// Median time, s.
+    pub median_s: f64,
+    /// Number of realizations measured, at least one.
+    pub measured: usize,
+    /// Number of them that failed.
+    pub failed: usize,
 }
 
 /// The time of one realization.

@@ -1,4 +1,5 @@
 use std::path::Path;
+use std::time::Duration;
 
 use osteon_common::job::JobKind;
 use osteon_files::document::Format;

@@ -3,7 +3,7 @@
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::settings::Extremum;
 
-use super::Observation;
+use super::observation::Observation;
 
 /// Summary of the realizations at one point.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,3 +1,5 @@
+use osteon_common::outcome::FailureKind;
+
 use super::*;
 
 fn observation(velocity: f64, other: Option<f64>, decay: f64) -> Observation {

@@ -19,7 +19,7 @@ use super::arguments::{
 };
 use crate::arguments::ClientArguments;
 use crate::exit_status::CommandFailure;
-use crate::surroundings::Surroundings;
+use crate::process_context::ProcessContext;
 
 /// A command about Slurm.
 #[derive(Debug)]
@@ -45,12 +45,12 @@ pub(super) enum SlurmTask {
 /// Resolves `slurm` and its subcommands.
 pub(super) fn scripts(
     arguments: SlurmArguments,
-    around: &Surroundings,
+    context: &ProcessContext,
 ) -> Result<SlurmTask, CommandFailure> {
     match arguments.command {
         SlurmCommand::Script(script) => Ok(SlurmTask::Job(Box::new(job_script(script)?))),
         SlurmCommand::Array(WorkerArrayArguments { count, client, allocation }) => {
-            let script = Box::new(worker_script(allocation, &around.remote(client)?)?);
+            let script = Box::new(worker_script(allocation, &context.remote(client)?)?);
             Ok(SlurmTask::Array { script, count })
         }
     }
@@ -59,11 +59,11 @@ pub(super) fn scripts(
 /// Resolves `workers slurm`; `client` is what stands before the operation.
 pub(super) fn scaling(
     arguments: ScalingArguments,
-    around: &Surroundings,
+    context: &ProcessContext,
     client: ClientArguments,
 ) -> Result<SlurmTask, CommandFailure> {
     let ScalingArguments { min, max, backlog, interval, dry_run, .. } = arguments;
-    let coordinator = around.remote(arguments.client.or(client))?;
+    let coordinator = context.remote(arguments.client.or(client))?;
     if min > max {
         return Err(CommandFailure::bad_input(anyhow!(
             "--min {min} must not be larger than --max {max}"

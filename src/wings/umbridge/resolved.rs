@@ -10,7 +10,7 @@ use osteon_umbridge::OwnHosts;
 use super::arguments::UmbridgeArguments;
 use crate::arguments::JobFileArguments;
 use crate::exit_status::CommandFailure;
-use crate::surroundings::{Locating, RunLocation, Surroundings};
+use crate::process_context::{Locating, ProcessContext, RunLocation};
 
 /// The protocol's usual port.
 const PORT_DEFAULT: u16 = 4242;
@@ -35,7 +35,7 @@ pub(super) struct ModelService {
 /// Resolves the arguments.
 pub(super) fn service(
     arguments: UmbridgeArguments,
-    around: &Surroundings,
+    context: &ProcessContext,
 ) -> Result<ModelService, CommandFailure> {
     let UmbridgeArguments {
         job,
@@ -51,9 +51,9 @@ pub(super) fn service(
         Some(port) => port,
         None => port_of(std::env::var(PORT_VARIABLE).ok())?,
     };
-    let location = around.locate(Locating { workers, threads, coordinator, credentials })?;
+    let location = context.locate(Locating { workers, threads, coordinator, credentials })?;
     let (address, hosts) = (SocketAddr::new(address, port), OwnHosts::new(host_name(), http_host));
-    Ok(ModelService { job, address, hosts, location, isa: Surroundings::isa()? })
+    Ok(ModelService { job, address, hosts, location, isa: ProcessContext::isa()? })
 }
 
 /// Returns the port that the environment names; an empty variable counts as unset.

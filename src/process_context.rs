@@ -1,4 +1,5 @@
-//! What the words of a command line are resolved against: the environment, and this machine.
+//! What the words of a command line are resolved against: the environment of this process, and its
+//! machine.
 
 use anyhow::anyhow;
 use osteon_client::client::Remote;
@@ -13,8 +14,8 @@ use crate::exit_status::CommandFailure;
 /// Default number of worker processes of a run on this machine.
 pub(crate) const WORKERS_DEFAULT: u32 = 2;
 
-/// The environment, and this machine.
-pub(crate) struct Surroundings {
+/// The environment of this process, and its machine.
+pub(crate) struct ProcessContext {
     /// The environment.
     pub(crate) environment: Environment,
     /// Number of this machine's cores.
@@ -43,7 +44,7 @@ pub(crate) struct Locating {
     pub(crate) credentials: CredentialArguments,
 }
 
-impl Surroundings {
+impl ProcessContext {
     /// Reads those of this process.
     ///
     /// # Errors
