@@ -5,7 +5,7 @@ mod inputs;
 mod jobs;
 mod operators;
 mod realizations;
-mod services;
+pub(crate) mod services;
 mod tools;
 
 use std::path::PathBuf;
@@ -25,8 +25,6 @@ pub(crate) use jobs::{
 };
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
-#[cfg(feature = "live")]
-pub(crate) use services::only_tcp;
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use tools::{
     CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments, SchemaArguments,

@@ -6,7 +6,7 @@ use clap::Args;
 use osteon_coordinator::{Listener, PageBindError};
 
 use super::host_name::host_name;
-use crate::arguments::only_tcp;
+use crate::arguments::services::only_tcp;
 use crate::exit_status::CommandFailure;
 
 /// Option of a run.

@@ -9,14 +9,14 @@ use axum::middleware::Next;
 use axum::response::Response;
 use osteon_http::{OwnHosts, host_of, is_cross_site};
 
+use super::answers;
 use super::protocol_error::{ProtocolError, quoted};
-use super::routes;
 
 /// Answers a request, or refuses it before it is looked at.
 pub(super) async fn guard(State(hosts): State<OwnHosts>, request: Request, next: Next) -> Response {
     match admit(&hosts, &request) {
         Ok(()) => next.run(request).await,
-        Err(error) => routes::refused(request, error).await,
+        Err(error) => answers::refused(request, error).await,
     }
 }
 

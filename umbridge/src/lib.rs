@@ -2,11 +2,12 @@
 //! samplers and other programs in any language.
 //!
 //! `listener` accepts connections, within the bounds of `crowd`, `gate` refuses what pages in browsers
-//! send, `routes` answers requests, `functions` knows what each model computes, and `evaluator` has its
+//! send, `routes` and `answers` answer requests, `functions` knows what each model computes, and `evaluator` has its
 //! realizations computed by the workers of a coordinator.
 
 #![forbid(unsafe_code)]
 
+mod answers;
 mod crowd;
 mod derivatives;
 mod deterministic;

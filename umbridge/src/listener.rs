@@ -13,8 +13,8 @@ use osteon_http::{ConnectionBounds, Connections};
 use thiserror::Error;
 use tokio::net::{TcpListener, TcpStream};
 
+use super::answers;
 use super::crowd::{Admission, Crowd, CrowdLimits, LIMITS};
-use super::routes;
 
 /// Error when the address cannot be bound.
 #[derive(Debug, Error)]
@@ -90,7 +90,7 @@ impl Service {
             }
             ready(response)
         };
-        let busy = routes::busy(limits.message());
+        let busy = answers::busy(limits.message());
         Self { limits, crowd, router: router.layer(map_response(leave)), busy }
     }
 
