@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 use crate::known_quantities::KnownQuantities;
-use crate::observables::{ObservableSet, PerObservable};
+use crate::observables::{ObservableSet, ObservedColumns, PerObservable};
 
 /// The measured velocities, or their moments, with the instrument's own scatter.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +28,7 @@ pub enum Measurements {
         /// Subject of each velocity, as for [`Group::subjects`].
         subjects: Option<Vec<u32>>,
         /// Observables measured with each velocity, as for [`Group::observables`].
-        observables: MeasuredObservables,
+        observables: ObservedColumns,
     },
     /// Several sets of velocities. Each group is identified separately, in this order; at least one
     /// of them has two different velocities.
@@ -45,10 +45,6 @@ pub enum Measurements {
     },
 }
 
-/// The measured values of each observable, in its unit and in the order of the velocities; `None` for one
-/// that was not measured.
-pub type MeasuredObservables = PerObservable<Option<Vec<f64>>>;
-
 /// The measured velocities of one group: a bone, a patient, a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
@@ -61,7 +57,7 @@ pub struct Group {
     pub subjects: Option<Vec<u32>>,
     /// Values of other observables that were measured with each velocity; the same observables of all
     /// groups of a job.
-    pub observables: MeasuredObservables,
+    pub observables: ObservedColumns,
     /// Quantities of the setup that are known of this group; the same ones of all groups of a job.
     pub known: KnownQuantities,
 }
@@ -111,7 +107,7 @@ pub fn numbered<T: Ord>(names: impl IntoIterator<Item = T>) -> Vec<u32> {
 impl Group {
     /// Creates a group of independent velocities, m/s.
     pub fn new(name: impl Into<String>, velocities: Vec<f64>) -> Self {
-        let (observables, known) = (MeasuredObservables::default(), KnownQuantities::default());
+        let (observables, known) = (ObservedColumns::default(), KnownQuantities::default());
         Self { name: name.into(), velocities, subjects: None, observables, known }
     }
 
@@ -130,7 +126,7 @@ impl Group {
 impl Data {
     /// Creates data of one set of independent velocities, m/s.
     pub fn from_velocities(velocities: Vec<f64>) -> Self {
-        let observables = MeasuredObservables::default();
+        let observables = ObservedColumns::default();
         Self::exact(Measurements::Velocities { velocities, subjects: None, observables })
     }
 

@@ -125,6 +125,10 @@ pub type ObservableSet = PerObservable<bool>;
 /// Means of those observables that are known.
 pub type ObservableMeans = PerObservable<Option<f64>>;
 
+/// The values of those observables that there are, each in its unit, one for each velocity of data or for
+/// each realization.
+pub type ObservedColumns = PerObservable<Option<Vec<f64>>>;
+
 /// The observables of one realization, each in its unit; 0 for one that was not asked for, and on failure.
 pub type ObservedValues = PerObservable<f64>;
 

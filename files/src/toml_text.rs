@@ -4,12 +4,12 @@
 use std::fmt::{self, Write as _};
 
 use osteon_common::case::{Case, Setup};
-use osteon_common::data::MeasuredObservables;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, Section, entries};
 use osteon_common::job::{
     Data, Group, JobSpecification, Measurements, PosteriorSettings, Prior, Range, Search,
 };
+use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::Parameter;
 
 /// Number of velocities per line of an inlined data set.
@@ -171,7 +171,7 @@ fn set(
     out: &mut String,
     velocities: &[f64],
     subjects: Option<&[u32]>,
-    observables: &MeasuredObservables,
+    observables: &ObservedColumns,
 ) -> fmt::Result {
     list(out, "velocities", velocities)?;
     subjects.map_or(Ok(()), |subjects| list(out, "subjects", subjects))?;

@@ -1,15 +1,14 @@
 //! Values of observables as messages, which name each observable as the table in `osteon-common` does.
 
-use osteon_common::observables::{Observable, ObservableMeans, ObservableSet, PerObservable};
+use osteon_common::observables::{
+    Observable, ObservableMeans, ObservableSet, ObservedColumns, PerObservable,
+};
 
 use crate::malformed::Malformed;
 use crate::v1;
 
-/// Values of those observables that there are.
-pub type Columns = PerObservable<Option<Vec<f64>>>;
-
 /// Returns the messages of columns of values.
-pub fn columns_to_messages(columns: &Columns) -> Vec<v1::ObservedValues> {
+pub fn columns_to_messages(columns: &ObservedColumns) -> Vec<v1::ObservedValues> {
     let message = |(one, values): (Observable, &Vec<f64>)| v1::ObservedValues {
         observable: one.name().to_owned(),
         values: values.clone(),
@@ -21,8 +20,10 @@ pub fn columns_to_messages(columns: &Columns) -> Vec<v1::ObservedValues> {
 ///
 /// # Errors
 /// If an observable is unknown, or comes twice.
-pub fn columns_from_messages(messages: &[v1::ObservedValues]) -> Result<Columns, Malformed> {
-    let mut columns = Columns::default();
+pub fn columns_from_messages(
+    messages: &[v1::ObservedValues],
+) -> Result<ObservedColumns, Malformed> {
+    let mut columns = ObservedColumns::default();
     for v1::ObservedValues { observable, values } in messages {
         put(&mut columns, observable, values.clone())?;
     }

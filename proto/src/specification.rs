@@ -7,6 +7,7 @@ use osteon_common::job::{
     Range, Search,
 };
 use osteon_common::known_quantities::KnownQuantities;
+use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::violations::Violations;
@@ -164,7 +165,7 @@ fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measu
     let mut observables = |messages: &[v1::ObservedValues]| {
         observed::columns_from_messages(messages).unwrap_or_else(|malformed| {
             violations.add("data.observables", malformed.to_string());
-            observed::Columns::default()
+            ObservedColumns::default()
         })
     };
     let numbers = |subjects: &[u32]| (!subjects.is_empty()).then(|| numbered(subjects));

@@ -1,11 +1,10 @@
 //! Moments of measured data and their noise.
 
 use crate::data::{Data, Measurements, VelocitySet};
-use crate::moments::{ComparedMoments, Moments};
+use crate::moments::Moments;
 
 use super::central::{Central, central};
 use super::moments;
-use super::observed::measured_observables;
 use super::sum::Sum;
 
 impl Data {
@@ -19,13 +18,6 @@ impl Data {
             _ => self.velocities(set).and_then(moments),
         };
         measured.map_or(Moments::UNKNOWN, |all| without_repeatability(all, self.repeatability))
-    }
-
-    /// Returns the moments of a set, by its number, in which a model is compared with it.
-    pub fn compared(&self, set: usize) -> ComparedMoments {
-        let measured = self.set(set).as_ref().map(measured_observables).unwrap_or_default();
-        let observables = measured.map(|found| found.map(|found| found.mean));
-        ComparedMoments { velocities: self.moments(set), observables }
     }
 }
 

@@ -1,8 +1,10 @@
 //! Observables besides the velocity: their means over realizations and over data, and the errors of both.
 
-use crate::data::VelocitySet;
+use crate::data::{Data, VelocitySet};
 use crate::job::{MonteCarlo, Sampling};
-use crate::moments::{MomentMatrix, ObservableEstimate, ObservableEstimates, moment_vector};
+use crate::moments::{
+    ComparedMoments, MomentMatrix, ObservableEstimate, ObservableEstimates, moment_vector,
+};
 use crate::observables::ObservableMeans;
 use crate::outcomes::Outcomes;
 
@@ -55,6 +57,15 @@ fn estimate(
     };
     let Scatter { mean, deviation: standard_deviation, .. } = found;
     Some(ObservableEstimate { mean, standard_deviation, standard_error })
+}
+
+impl Data {
+    /// Returns the moments of a set, by its number, in which a model is compared with it.
+    pub fn compared(&self, set: usize) -> ComparedMoments {
+        let measured = self.set(set).as_ref().map(measured_observables).unwrap_or_default();
+        let observables = measured.map(|found| found.map(|found| found.mean));
+        ComparedMoments { velocities: self.moments(set), observables }
+    }
 }
 
 /// Returns mean and scatter of each measured observable, with the standard error of the mean, from the

@@ -48,12 +48,12 @@ impl PosteriorDensity {
 #[cfg(test)]
 mod tests {
     use osteon_common::case::Setup;
-    use osteon_common::data::MeasuredObservables;
     use osteon_common::job::{
         Data, JobKind, Measurements, MonteCarlo, Objective, PosteriorPrior, PosteriorSettings,
         Range, Search,
     };
     use osteon_common::moments::Moments;
+    use osteon_common::observables::ObservedColumns;
     use osteon_common::random_quantities::RandomQuantities;
 
     use super::*;
@@ -117,7 +117,7 @@ mod tests {
         data.measurements = Measurements::Velocities {
             velocities: velocities.to_vec(),
             subjects: None,
-            observables: MeasuredObservables::default(),
+            observables: ObservedColumns::default(),
         };
         let density = PosteriorDensity::new(&job(data), 0).unwrap();
         assert!(density.log_density(&at(12e9), &MEAN.into()).is_some());

@@ -63,7 +63,7 @@ fn specification() -> JobSpecification {
         name: name.to_owned(),
         velocities: (0..20).map(|k| base + 20.0 * f64::from(k)).collect(),
         subjects: None,
-        observables: osteon_common::data::MeasuredObservables::default(),
+        observables: osteon_common::observables::ObservedColumns::default(),
         known: KnownQuantities::default(),
     };
     specification.data = Some(Data::from_groups(vec![group("a", 3800.0), group("b", 3900.0)]));

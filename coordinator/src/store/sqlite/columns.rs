@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use osteon_common::observables::{OBSERVABLES, PerObservable};
+use osteon_common::observables::{OBSERVABLES, ObservedColumns, PerObservable};
 use osteon_common::outcome::{Outcome, decode, encode};
 use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Point};
 use osteon_common::results::EstimatedError;
@@ -107,9 +107,6 @@ pub(super) fn checksum(fields: &[&[u8]]) -> Vec<u8> {
     hasher.finalize().as_bytes().to_vec()
 }
 
-/// Values of observables beside records, a column for each that there is.
-pub(super) type Columns = PerObservable<Option<Vec<f64>>>;
-
 /// First byte of a blob whose records are followed by columns of observables; no record begins with it.
 const COLUMNS_FOLLOW: u8 = 0xFF;
 
@@ -149,9 +146,11 @@ pub(super) fn with_columns(
 
 /// Returns the records of a blob, of `RECORD` bytes each, and the observables that follow them; `None` if
 /// it is damaged.
-pub(super) fn without_columns<const RECORD: usize>(packed: &[u8]) -> Option<(&[u8], Columns)> {
+pub(super) fn without_columns<const RECORD: usize>(
+    packed: &[u8],
+) -> Option<(&[u8], ObservedColumns)> {
     let [COLUMNS_FOLLOW, bits, both @ ..] = packed else {
-        return Some((packed, Columns::default()));
+        return Some((packed, ObservedColumns::default()));
     };
     let has = PerObservable::new(|one| bits & (1 << (one as u8)) != 0);
     let row_bytes = RECORD + 8 * has.members().count();
@@ -166,7 +165,7 @@ pub(super) fn without_columns<const RECORD: usize>(packed: &[u8]) -> Option<(&[u
 }
 
 /// Returns outcomes and their observables; `None` if they are damaged.
-pub(super) fn unpack_outcomes(packed: &[u8]) -> Option<(Vec<Outcome>, Columns)> {
+pub(super) fn unpack_outcomes(packed: &[u8]) -> Option<(Vec<Outcome>, ObservedColumns)> {
     let (packed, columns) = without_columns::<OUTCOME_BYTES>(packed)?;
     let (records, rest) = packed.as_chunks::<OUTCOME_BYTES>();
     if !rest.is_empty() {

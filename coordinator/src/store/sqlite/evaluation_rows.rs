@@ -7,13 +7,14 @@
 //! SQLite copies a row several times. Copies of a piece stay in the cache of the processor, and the next
 //! piece uses their memory again; a row of 90 MB took twice as long as its pieces.
 
+use osteon_common::observables::ObservedColumns;
 use osteon_common::outcome::Outcome;
 use osteon_common::outcomes::Outcomes;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
 
 use super::columns::{
-    Columns, checksum, evaluation_checksum, pack_errors, pack_outcomes, pack_point, pack_workers,
-    unpack, unpack_errors, unpack_outcomes, unpack_workers,
+    checksum, evaluation_checksum, pack_errors, pack_outcomes, pack_point, pack_workers, unpack,
+    unpack_errors, unpack_outcomes, unpack_workers,
 };
 use crate::core::ids::JobId;
 use crate::store::{EvaluationRecord, PIECE_OUTCOMES, PieceRecord};
@@ -167,7 +168,7 @@ pub(super) fn get(
 }
 
 /// Outcomes with their observables.
-type Unpacked = (Vec<Outcome>, Columns);
+type Unpacked = (Vec<Outcome>, ObservedColumns);
 
 /// The pieces of an evaluation, in order.
 #[derive(Default)]
