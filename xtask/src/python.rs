@@ -61,16 +61,6 @@ pub(crate) fn wheels(words: &[String]) -> Result<()> {
     cargo(&mut command).context(NEEDS)
 }
 
-/// Makes the messages and stubs that the package ships from the .proto files.
-pub(crate) fn stubs(words: &[String]) -> Result<()> {
-    if !words.is_empty() {
-        bail!("usage: cargo xtask generate stubs");
-    }
-    let mut command = python("python/protos.py");
-    command.arg("--environment").arg(programs()?.with_file_name("python-package").join("venv"));
-    cargo(&mut command).context(NEEDS)
-}
-
 /// Runs a suite of `python/check.py`, or those of its tests that `words` name.
 fn check(name: &str, words: &[impl AsRef<str>]) -> Result<()> {
     let mut command = suite(name)?;
