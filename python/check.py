@@ -1,6 +1,5 @@
 """Builds the wheel of the package osteon, installs it in a virtual environment, and tests it there: the
-tests, the types of the package, of its stubs and of its tests, and whether the messages that it ships are made
-from the .proto files. Uses the standard library only.
+tests, and the types of the package, of its stubs and of its tests. Uses the standard library only.
 
 Other suites need packages of their own: `pools` runs workers in Dask and Ray, `notebooks` executes
 examples/notebooks, and `bench` measures what Python adds."""
@@ -34,7 +33,7 @@ def main():
     check_version()
     arguments.work = arguments.work.absolute()
     folder = HERE / SUITES[arguments.suite]
-    python = make(arguments.work / "venv", folder / "requirements.txt")
+    python = make(arguments.work / "venv", HERE / "build.txt", folder / "requirements.txt")
     install(python, arguments.work / "wheels", arguments.profile)
     variables = dict(os.environ, PYTHONDONTWRITEBYTECODE="1", MYPYPATH=MODULES)
     variables.pop("OSTEON_COORDINATOR", None)
@@ -43,7 +42,6 @@ def main():
         return
     tests = arguments.tests or [path.stem for path in sorted(folder.glob("test_*.py"))]
     if arguments.suite == "package" and not arguments.tests:
-        run([sys.executable, HERE / "protos.py", "--check", "--environment", arguments.work / "venv"])
         types(python, variables, arguments.work)
     run([python, *warnings(arguments.suite), "-m", "unittest", "-v", *tests], folder, variables)
 
@@ -58,7 +56,7 @@ def install(python, wheels, profile):
     shutil.rmtree(wheels, ignore_errors=True)
     build = [python, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"]
     variables = dict(os.environ, OSTEON_BUILD_PROFILE=profile)
-    # maturin of the environment must be found.
+    # maturin and mypy-protobuf of the environment must be found.
     variables["PATH"] = f"{python.parent}{os.pathsep}{variables['PATH']}"
     run([*build, "--wheel-dir", wheels, HERE], ROOT, variables)
     [wheel] = wheels.glob("osteon-*.whl")

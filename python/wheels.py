@@ -38,21 +38,21 @@ def main():
         parser.error(f"{processor} is none of {', '.join(PROCESSORS)}")
     check_version()
     work = arguments.work.absolute()
-    python = make(work / "venv", HERE / "wheels.txt")
+    python = make(work / "venv", HERE / "build.txt", HERE / "wheels.txt")
+    # cargo-zigbuild and maturin find the package ziglang by the Python of this environment.
+    variables = dict(os.environ, PATH=f"{python.parent}{os.pathsep}{os.environ['PATH']}")
+    run([python, "-c", "from osteon_build import modules; modules.write()"], HERE / "backend", variables)
     for processor in arguments.processors or PROCESSORS:
-        build(python, work, processor, arguments.profile)
+        build(python, work, processor, arguments.profile, variables)
 
 
-def build(python, work, processor, profile):
+def build(python, work, processor, profile, variables):
     """Builds one wheel, and says what it is."""
     target = f"{processor}-unknown-linux-gnu"
     run(["rustup", "target", "add", target], ROOT)
-    variables = dict(os.environ)
-    # cargo-zigbuild and maturin find the package ziglang by the Python of this environment.
-    variables["PATH"] = f"{python.parent}{os.pathsep}{variables['PATH']}"
-    variables["CARGO_TARGET_DIR"] = str(work / "target")
     # The linker leaves out what only a debugger needs.
-    variables[f"CARGO_PROFILE_{profile.upper()}_STRIP"] = "symbols"
+    strip = {f"CARGO_PROFILE_{profile.upper()}_STRIP": "symbols"}
+    variables = variables | strip | {"CARGO_TARGET_DIR": str(work / "target")}
     zigbuild = ["cargo-zigbuild", "zigbuild", "--locked", "--package", "osteon", "--bin", "osteon"]
     run([*zigbuild, "--profile", profile, "--target", f"{target}.{GLIBC}"], ROOT, variables)
     folder = "debug" if profile == "dev" else profile

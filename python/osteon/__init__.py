@@ -14,7 +14,8 @@ from osteon._client import Client
 from osteon._jobs import Job
 from osteon._native import Case
 from osteon._native import version as _version
-from osteon._results import Estimate, Group, Moments, Result, Tables
+from osteon._objects import Moments
+from osteon._results import Estimate, Group, Result, Tables
 from osteon._simulate import Ensemble, Simulation, ensemble, simulate, velocities
 from osteon._states import Credentials, JobState
 from osteon.errors import (

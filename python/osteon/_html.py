@@ -7,7 +7,8 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from osteon._results import Estimate, Moments, Part
+    from osteon._objects import Moments
+    from osteon._results import Estimate, Part
 
 GOOD, DOUBTFUL, BAD = "#d9ead9", "#fbecc4", "#f6d6d0"
 """Backgrounds of cells; each also says in words what it means."""

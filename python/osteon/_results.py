@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from osteon._objects import known
 from osteon._scratch import Scratch
 from osteon.errors import InputError, UnreadableFileError
+from osteon.results import GroupKeys, PartKeys, QuantityEstimate, QuantityPosterior, ResultKeys
 
 if TYPE_CHECKING:
     import pandas
@@ -28,23 +30,6 @@ COUNTS = frozenset({"evaluation", "index", "start", "draw", "failures", "velocit
 
 TEXTS = frozenset({"group", "failure", "status", "reason", "first", "second"})
 """Columns of texts."""
-
-
-@dataclass(frozen=True)
-class Moments:
-    """Mean and coefficient of variation of velocities.
-
-    Attributes:
-        mean: mean velocity, m/s; None where every realization failed.
-        coefficient_of_variation: standard deviation over mean.
-        mean_standard_error: standard error of the mean, m/s.
-        coefficient_of_variation_standard_error: standard error of the coefficient of variation.
-    """
-
-    mean: float
-    coefficient_of_variation: float
-    mean_standard_error: float | None = None
-    coefficient_of_variation_standard_error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -78,11 +63,8 @@ class Tables(NamedTuple):
     posterior: pandas.DataFrame | None
 
 
-class Part:
+class Part(PartKeys):
     """What a job found from one set of data: the result, or one of its groups."""
-
-    def __init__(self, values: Mapping[str, Any]) -> None:
-        self._values = values
 
     @property
     def status(self) -> str:
@@ -91,72 +73,32 @@ class Part:
         return str(self._values.get("status", "done"))
 
     @property
-    def reason(self) -> str | None:
-        """Why it ended so, if there is more to say."""
-        return self._values.get("reason")
-
-    @property
-    def cost(self) -> float | None:
-        """Cost of the best point."""
-        return self._values.get("cost")
-
-    @property
     def parameters(self) -> dict[str, float]:
         """Parameters of the best point by name (SI units), without the dispersion. A single one means
         little where the data leave directions free: see :attr:`estimates`."""
         return dict(self._values.get("parameters") or {})
 
     @property
-    def dispersion(self) -> float | None:
-        """Dispersion δ of the best point."""
-        return self._values.get("dispersion")
-
-    @property
-    def velocity(self) -> Moments:
-        """Moments of the model's velocities at the best point."""
-        return moments(self._values.get("velocity"))
-
-    @property
-    def data(self) -> Moments | None:
-        """Moments of the measured velocities; None for a propagation."""
-        found = self._values.get("data")
-        return None if found is None else moments(found)
-
-    @property
-    def failures(self) -> dict[str, int]:
-        """Number of failed realizations at the best point by kind."""
-        return dict(self._values.get("failures") or {})
-
-    @property
     def estimates(self) -> dict[str, Estimate]:
         """What the data say of √(c1111/ρ) (`bulk_velocity`, m/s), the dispersion, and each free
         parameter; from the posterior, if there is one."""
-        identified = self._values.get("identified") or {}
-        found: dict[str, Any] = {
-            name: identified.get(name) for name in ("bulk_velocity", "dispersion")
-        }
-        for name, entry in (identified.get("parameters") or {}).items():
-            if name not in found:
-                at = self.parameters.get(name, math.nan)
-                found[name] = entry or {"value": at}
-        posterior = self._values.get("posterior") or {}
-        if posterior:
-            found |= {"bulk_velocity": summary(posterior.get("bulk_velocity"))}
-            found |= {
-                name: summary(entry) for name, entry in (posterior.get("parameters") or {}).items()
-            }
-        return {name: estimate(entry) for name, entry in found.items() if entry is not None}
+        found: dict[str, Estimate] = {}
+        if (identified := self.identified) is not None:
+            found["bulk_velocity"] = estimate(identified.bulk_velocity)
+            found["dispersion"] = estimate(identified.dispersion)
+            for name, entry in identified.parameters.items():
+                unknown = Estimate(self.parameters.get(name, math.nan), None, None)
+                found.setdefault(name, unknown if entry is None else estimate(entry))
+        if (posterior := self.posterior) is not None:
+            found["bulk_velocity"] = summary(posterior.bulk_velocity)
+            found |= {name: summary(entry) for name, entry in posterior.parameters.items()}
+        return found
 
     @property
     def free_directions(self) -> list[dict[str, float]]:
         """Directions in the space of the parameters that the data leave free: orthonormal, in units of
         the bounds."""
-        return list((self._values.get("identified") or {}).get("free_directions") or [])
-
-    @property
-    def json(self) -> dict[str, Any]:
-        """Everything that `result.json` says of it; docs/results.md explains each key."""
-        return dict(self._values)
+        return [] if self.identified is None else self.identified.free_directions
 
     def _repr_html_(self) -> str:
         from osteon._html import part
@@ -164,17 +106,12 @@ class Part:
         return part(self)
 
 
-class Group(Part):
+class Group(Part, GroupKeys):
     """The result of one group."""
 
-    @property
-    def name(self) -> str:
-        """Its name."""
-        return str(self._values["name"])
 
-
-class Result(Part):
-    """The result of a job.
+class Result(Part, ResultKeys):
+    """The result of a job, with the keys of `result.json` as attributes.
 
     In a notebook it is a table. The directory of its files is removed with the object, unless `out` was
     given.
@@ -205,19 +142,9 @@ class Result(Part):
         return cls(values, Path(directory))
 
     @property
-    def digest(self) -> str:
-        """Digest of everything that was computed: equal digests mean equal results, to the bit."""
-        return str(self._values["digest"])
-
-    @property
     def evaluations(self) -> int:
         """Number of evaluations of the search."""
         return int(self._values.get("evaluations", 1))
-
-    @property
-    def realizations(self) -> int:
-        """Number of realizations of each evaluation."""
-        return int(self._values["realizations"])
 
     @property
     def groups(self) -> dict[str, Group]:
@@ -295,38 +222,24 @@ class Result(Part):
         savemat(os.fspath(path), found, long_field_names=True, oned_as="column")
 
     def __repr__(self) -> str:
-        kind = self._values.get("kind", "job")
-        return f"<Result: {kind}, {self.status}, digest {self.digest}>"
+        return f"<Result: {self.kind}, {self.status}, digest {self.digest}>"
 
 
-def moments(found: Mapping[str, Any] | None) -> Moments:
-    """The moments of an object of `result.json`."""
-    found = found or {}
-    error = found.get("standard_error") or {}
-    keys = ("mean", "coefficient_of_variation")
-    values = [math.nan if found.get(key) is None else float(found[key]) for key in keys]
-    return Moments(values[0], values[1], *(error.get(key) for key in keys))
+def estimate(found: QuantityEstimate) -> Estimate:
+    """The estimate of a quantity, to first order around the best point."""
+    return Estimate(known(found.value), found.standard_error, ends(found.interval))
 
 
-def estimate(found: Mapping[str, Any]) -> Estimate:
-    """The estimate of an object of `result.json`."""
-    interval = found.get("interval")
-    return Estimate(
-        float(found["value"]),
-        found.get("standard_error"),
-        None if interval is None else (float(interval[0]), float(interval[1])),
-    )
+def summary(found: QuantityPosterior) -> Estimate:
+    """The estimate of a quantity by its posterior."""
+    return Estimate(known(found.mean), found.standard_deviation, ends(found.interval_95))
 
 
-def summary(found: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """The summary of a posterior in the form of an estimate."""
-    if found is None:
+def ends(interval: tuple[float | None, float | None] | None) -> tuple[float, float] | None:
+    """Both ends of an interval, where they are known."""
+    if interval is None or interval[0] is None or interval[1] is None:
         return None
-    return {
-        "value": found["mean"],
-        "standard_error": found["standard_deviation"],
-        "interval": found["interval_95"],
-    }
+    return interval[0], interval[1]
 
 
 def converted(key: str, values: list[str]) -> NDArray[Any]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import copy
 import re
 import unittest
+from collections.abc import Iterator
 from html.parser import HTMLParser
 
 import numpy as np
 import osteon
 from osteon import _html
+from osteon._objects import Object
 from support import EXAMPLES, SEARCHED, TestCase, small_job
 
 
@@ -37,6 +39,19 @@ def words(html: str) -> str:
     parser.feed(html)
     assert parser.open == [], parser.open
     return " | ".join(parser.words)
+
+
+def without_attribute(found: object, path: str) -> Iterator[str]:
+    """The keys of a result that its classes do not have as attributes."""
+    if isinstance(found, Object):
+        for key in found.json:
+            if not isinstance(getattr(type(found), key, None), property):
+                yield f"{path}.{key}"
+            else:
+                yield from without_attribute(getattr(found, key), f"{path}.{key}")
+    elif isinstance(found, (list, dict)):
+        for entry in found.values() if isinstance(found, dict) else found:
+            yield from without_attribute(entry, path)
 
 
 class Search(TestCase):
@@ -72,6 +87,23 @@ class Search(TestCase):
         self.assertEqual(result.estimates["density"].value, result.parameters["density"])
         group = next(iter(self.groups.groups.values()))
         self.assertTrue(group.estimates["bulk_velocity"].is_determined)
+
+    def test_every_key_of_the_file_is_an_attribute(self) -> None:
+        propagation = osteon.Job(parameters=SEARCHED, monte_carlo={"realizations": 5}).propagate(progress=False)
+        for result in (self.free, self.groups, self.posterior, propagation):
+            self.assertEqual(list(without_attribute(result, "result")), [])
+
+    def test_keys_are_objects_and_what_is_not_there_is_none(self) -> None:
+        identified = self.free.identified
+        assert identified is not None
+        self.assertEqual(identified.bulk_velocity.value, self.free.json["identified"]["bulk_velocity"]["value"])
+        self.assertEqual(self.free.velocity, self.free.velocity)
+        self.assertNotEqual(self.free.velocity, self.posterior.velocity)
+        self.assertIsNone(self.free.posterior)
+        self.assertEqual(self.free.profiles["density"].values, self.free.json["profiles"]["density"]["values"])
+        failed = osteon.Moments({"mean": None, "coefficient_of_variation": None})
+        self.assertTrue(np.isnan(failed.mean))
+        self.assertIsNone(failed.mean_standard_error)
 
     def test_tables_are_arrays_and_frames(self) -> None:
         history = self.free.table("history")

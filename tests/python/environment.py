@@ -14,10 +14,11 @@ def check_version():
         sys.exit(f"Python {sys.version.split()[0]} is too old; {'.'.join(map(str, OLDEST))} is needed")
 
 
-def make(venv, requirements):
-    """A virtual environment with the requirements; made again when they change. Its Python."""
+def make(venv, *requirements):
+    """A virtual environment with the requirements of these files; made again when they change. Its Python."""
     python = venv / "bin" / "python"
-    wanted = hashlib.sha256(requirements.read_bytes() + sys.version.encode()).hexdigest()
+    contents = [path.read_bytes() for path in requirements]
+    wanted = hashlib.sha256(b"".join(contents) + sys.version.encode()).hexdigest()
     stamp = venv / "complete"
     if stamp.is_file() and stamp.read_text() == wanted:
         return python
@@ -28,7 +29,8 @@ def make(venv, requirements):
         sys.exit(f"Python has no module {error.name}; on Debian: apt-get install python3-venv")
     shutil.rmtree(venv, ignore_errors=True)
     run([sys.executable, "-m", "venv", venv])
-    run([python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", "-r", requirements])
+    install = [python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:"]
+    run([*install, *(word for path in requirements for word in ("-r", path))])
     stamp.write_text(wanted)
     return python
 

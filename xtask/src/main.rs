@@ -133,13 +133,8 @@ const VERBS: &[Verb] = &[
         parts: &[
             (
                 "reference",
-                "what docs/ and python/ take from the program: tables of keys, schemas, types",
+                "what docs/ takes from the program: tables of keys, schemas, pages of references",
                 Action::Function(reference::write),
-            ),
-            (
-                "stubs",
-                "the messages and stubs of the Python package, from the .proto files",
-                Action::Function(python::stubs),
             ),
             (
                 "tables",

@@ -6,7 +6,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 
 use crate::places::{programs, root};
 use crate::process::{cargo, cargo_command, output};
@@ -58,16 +58,6 @@ pub(crate) fn bench(words: &[String]) -> Result<()> {
 pub(crate) fn wheels(words: &[String]) -> Result<()> {
     let mut command = python("python/wheels.py");
     command.arg("--work").arg(programs()?.with_file_name("python-wheels")).args(words);
-    cargo(&mut command).context(NEEDS)
-}
-
-/// Makes the messages and stubs that the package ships from the .proto files.
-pub(crate) fn stubs(words: &[String]) -> Result<()> {
-    if !words.is_empty() {
-        bail!("usage: cargo xtask generate stubs");
-    }
-    let mut command = python("python/protos.py");
-    command.arg("--environment").arg(programs()?.with_file_name("python-package").join("venv"));
     cargo(&mut command).context(NEEDS)
 }
 

@@ -1,5 +1,8 @@
 //! The results of an identification that a client can get from the messages alone.
 
+use std::path::Path;
+use std::{env, fs};
+
 use osteon_common::outcome::Outcome;
 use osteon_files::report::{Group, ResultFile};
 use osteon_files::results_csv;
@@ -60,21 +63,20 @@ fn result(parts: &Parts) -> ResultFile {
     result
 }
 
-/// The files are those that clients used to compute by themselves from evaluations and data.
+/// The files are those that clients used to compute by themselves from evaluations and data. With
+/// `INSTA_UPDATE=always`, as for snapshots, they are written instead.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_result_needs_no_more_than_the_wire() {
     for (name, job) in jobs::jobs() {
         let parts = fetched(&job).await;
         let result = result(&parts);
-        let expected = match name {
-            "several" => include_str!("several.json"),
-            "likelihood" => include_str!("likelihood.json"),
-            "drawn" => include_str!("drawn.json"),
-            "grouped" => include_str!("grouped.json"),
-            other => panic!("{other} has no file"),
-        };
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/wire/{name}.json"));
+        if env::var_os("INSTA_UPDATE").is_some_and(|mode| mode == "always") {
+            fs::write(&path, result.to_json()).unwrap();
+        }
+        let expected = fs::read_to_string(path).unwrap();
         assert_eq!(result.to_json(), expected, "{name}");
-        assert_eq!(ResultFile::from_json(expected).unwrap().to_json(), expected, "{name}");
+        assert_eq!(ResultFile::from_json(&expected).unwrap().to_json(), expected, "{name}");
         if name == "grouped" {
             let rows = parts.history.iter().flat_map(|block| &block.rows);
             let history: Vec<_> =

@@ -1,4 +1,5 @@
-"""Builds the wheel of osteon (PEP 517): the program, then the native module by maturin, both in it.
+"""Builds the wheel of osteon (PEP 517): modules that are made from other files, the program, then the native
+module by maturin, all in it.
 
 maturin alone packs either a module or a program. So the program is built first and placed where
 maturin looks for scripts; pip then installs it as the command `osteon`.
@@ -7,26 +8,28 @@ The variable OSTEON_BUILD_PROFILE names a profile of cargo other than `release`.
 
 import json
 import os
-import pathlib
 import shutil
 import subprocess
 
 import maturin
 from maturin import get_requires_for_build_editable, get_requires_for_build_wheel  # noqa: F401
 
-PYTHON = pathlib.Path(__file__).resolve().parent.parent
-ROOT = PYTHON.parent
+from . import modules
+from .modules import PYTHON, ROOT
+
 SCRIPTS = PYTHON / "osteon.data" / "scripts"
 PROFILE = os.environ.get("OSTEON_BUILD_PROFILE", "release")
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    modules.write()
     place_program()
     settings = settings_with_profile(config_settings)
     return maturin.build_wheel(wheel_directory, settings, metadata_directory)
 
 
 def build_editable(wheel_directory, config_settings=None, metadata_directory=None):
+    modules.write()
     place_program()
     settings = settings_with_profile(config_settings)
     return maturin.build_editable(wheel_directory, settings, metadata_directory)
