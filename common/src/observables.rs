@@ -268,7 +268,8 @@ impl<T: JsonSchema> JsonSchema for PerObservable<Option<T>> {
         let property = |one: Observable| {
             let mut schema = generator.subschema_for::<T>();
             let ObservableRow { title, unit, .. } = one.row();
-            let description = format!("{title} ({unit}); not there where [data] has none of it");
+            let description =
+                format!("The {title}, {unit}; not there where `[data]` has none of it.");
             schema.insert("description".to_owned(), description.into());
             (one.name(), schema)
         };
