@@ -43,7 +43,7 @@ pub struct Sampled {
 
 impl Arrival {
     /// Combines the arrivals of both directions. Both errors may have the same sign.
-    pub(crate) fn with(self, other: &Self) -> Self {
+    pub(crate) fn combine(self, other: &Self) -> Self {
         let [one, two] = [self.velocity, other.velocity];
         let passes = self.passes.zip(other.passes).map(|(one, two)| PassSummary {
             count: one.count + two.count,

@@ -75,7 +75,7 @@ impl Solver {
         workspace: &mut Workspace,
     ) -> Result<ObservedRealization, FailureKind> {
         let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
-        let own = ensemble.own_setup(index, self.setup()).map(|own| self.beside(&own));
+        let own = ensemble.own_setup(index, self.setup()).map(|own| self.with_setup(&own));
         let solver = own.as_ref().unwrap_or(self);
         let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
         let signal = solver.first_signal(&bone, &arrival, workspace);
@@ -93,7 +93,7 @@ impl Solver {
         let setup = self.setup();
         let other_extremum = setup.picking.extremum.other();
         let picking = Picking { extremum: other_extremum, ..setup.picking };
-        let other = self.beside(&Setup { picking, ..*setup }).arrival(bone, workspace);
+        let other = self.with_setup(&Setup { picking, ..*setup }).arrival(bone, workspace);
         let distances: Vec<f64> = setup.probe.distances().collect();
         FirstSignal {
             other_extremum,

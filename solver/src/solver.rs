@@ -60,23 +60,22 @@ impl Solver {
     /// Makes this the solver for cases of `setup`. Tables that stay the same are kept.
     pub fn change_setup(&mut self, setup: &Setup) {
         if self.setup != *setup {
-            *self = self.beside(setup);
+            *self = self.with_setup(setup);
         }
     }
 
-    /// Returns a solver for another setup, which shares the tables if they are the same.
-    pub(crate) fn beside(&self, setup: &Setup) -> Self {
+    /// Returns a solver for another setup. It shares this one's tables if the setup has the same.
+    pub(crate) fn with_setup(&self, setup: &Setup) -> Self {
         if !has_tables_of(setup, &self.setup) {
             return Self::with_isa(setup, self.isa);
         }
-        let reversed = self
-            .reversed
-            .as_ref()
-            .map(|exact| exact.sharing(&Setup { probe: setup.probe.from_other_side(), ..*setup }));
+        let reversed = self.reversed.as_ref().map(|exact| {
+            exact.with_setup(&Setup { probe: setup.probe.from_other_side(), ..*setup })
+        });
         Self {
             setup: *setup,
             isa: self.isa,
-            exact: self.exact.sharing(setup),
+            exact: self.exact.with_setup(setup),
             reversed,
             hybrid: Hybrid::with_isa(setup, self.isa),
         }
@@ -128,7 +127,7 @@ impl Solver {
             return Ok(Arrival { directions: Some([found.velocity; 2]), ..found });
         };
         match reversed.arrival(bone, &mut workspace.exact) {
-            Ok(other) => Ok(found.with(&other)),
+            Ok(other) => Ok(found.combine(&other)),
             Err(Failure { kind, detail }) => {
                 Err(Failure { kind, detail: format!("from the second source: {detail}") })
             }
@@ -168,7 +167,7 @@ impl Solver {
     ) -> Result<Arrival, FailureKind> {
         let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
         let arrival = match ensemble.own_setup(index, &self.setup) {
-            Some(own) => self.beside(&own).arrival(&bone, workspace),
+            Some(own) => self.with_setup(&own).arrival(&bone, workspace),
             None => self.arrival(&bone, workspace),
         };
         arrival.map_err(|failure| failure.kind)

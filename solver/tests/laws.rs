@@ -47,7 +47,7 @@ fn arrival(setup: &Setup, bone: &Bone) -> Arrival {
 }
 
 /// Largest difference of two arrivals' times, s.
-fn later(a: &Arrival, b: &Arrival) -> f64 {
+fn largest_delay(a: &Arrival, b: &Arrival) -> f64 {
     a.times.iter().zip(&b.times).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
@@ -261,7 +261,7 @@ fn source_and_receivers_may_be_exchanged() {
         setup.probe.receivers.x3 = 1e-3;
         let (back, back_traces) = (arrival(&setup, &bone), traces(&setup));
         // Rounding of the echoes, amplified by the picking.
-        assert!(later(&there, &back) < 1e-16, "index {index}: {there:?} {back:?}");
+        assert!(largest_delay(&there, &back) < 1e-16, "index {index}: {there:?} {back:?}");
         for (there, back) in there_traces.pressures.iter().zip(&back_traces.pressures) {
             let largest = there.iter().fold(0.0, |max: f64, p| max.max(p.abs()));
             let difference = there.iter().zip(back).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -278,7 +278,7 @@ fn position_along_the_bone_does_not_matter() {
     setup.probe.source = Source { x1: 1.0, x3: 2e-3 };
     setup.probe.receivers.first_x1 = 1.0 + 11e-3;
     // 1.0 + x - 1.0 loses sixteen digits less three.
-    assert!(later(&here, &arrival(&setup, &bone)) < 1e-16 * 1e3);
+    assert!(largest_delay(&here, &arrival(&setup, &bone)) < 1e-16 * 1e3);
 }
 
 #[test]
@@ -297,7 +297,7 @@ fn the_mirrored_bone_sends_the_same_wave() {
         // Above refinement 1 the series of a sublayer is summed to rounding.
         let mut setup = Setup::default();
         setup.solver.refinement = 1.5;
-        let difference = later(&arrival(&setup, &bone), &arrival(&setup, &mirrored));
+        let difference = largest_delay(&arrival(&setup, &bone), &arrival(&setup, &mirrored));
         // Rounding of Y, amplified by the picking.
         assert!(difference < 1e-13, "index {index}: {difference:e}");
     }

@@ -168,7 +168,7 @@ impl<'a> SmoothLoadStudy<'a> {
         let step = self.spacing() / ratio as f64;
         let times = Times { step, ratio, samples: SAMPLES };
         let width = LOAD_WIDTH / self.setup.probe.center_frequency;
-        self.memory.rest(times);
+        self.memory.reset(times);
         for (n, load) in self.memory.load.iter_mut().enumerate() {
             let t = n as f64 * times.step / width - LOAD_DELAY;
             *load = Lanes::splat(libm::exp(-t * t));

@@ -63,7 +63,6 @@ pub(super) struct Times {
     pub(super) step: f64,
     /// Time steps per sample.
     pub(super) ratio: usize,
-    /// Number of samples.
     pub(super) samples: usize,
 }
 
