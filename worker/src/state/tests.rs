@@ -52,7 +52,7 @@ impl Recorder {
     }
 
     /// The coordinator closes the stream of a worker that has drained.
-    fn dismissed(&mut self) {
+    fn dismiss(&mut self) {
         self.event(Event::Lost);
         self.expect(&[Effect::Leave]);
     }
@@ -78,7 +78,7 @@ impl Recorder {
     }
 
     fn complete(&mut self, attachment: u64, batch: u64) {
-        let computed = Computed::Complete { solved: solved(), elapsed_s: 0.5 };
+        let computed = Computed::Complete { solved: sample_results(), elapsed_s: 0.5 };
         self.event(Event::Computed(Task { attachment, batch }, computed));
     }
 
@@ -122,7 +122,7 @@ fn abandon(attachment: u64, batch: u64) -> Effect {
     Effect::Abandon(Task { attachment, batch })
 }
 
-fn solved() -> Vec<RealizationResult> {
+fn sample_results() -> Vec<RealizationResult> {
     let success = RealizationResult { outcome: Ok(3900.0), estimated_error: 2e-5, decay: 0.0 };
     vec![success, RealizationResult::failed(FailureKind::NoArrival)]
 }
@@ -242,7 +242,7 @@ fn a_drained_worker_finishes_what_it_holds() {
     worker.expect(&[answer(5)]);
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.dismissed();
+    worker.dismiss();
 }
 
 /// The coordinator sends a batch before it has heard that the worker drains.
@@ -258,7 +258,7 @@ fn a_batch_on_its_way_to_a_worker_that_drains_is_answered() {
     worker.expect(&[HEARTBEAT]);
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.dismissed();
+    worker.dismiss();
 }
 
 #[test]
@@ -273,7 +273,7 @@ fn a_worker_that_drains_before_its_welcome_tells_so_and_answers_what_is_on_its_w
     worker.expect(&[compute(1, 4)]);
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.dismissed();
+    worker.dismiss();
 }
 
 #[test]
@@ -314,11 +314,11 @@ fn a_worker_that_the_coordinator_sends_away_answers_what_it_holds_and_leaves() {
     worker.nothing_else();
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.dismissed();
+    worker.dismiss();
     let mut idle = Recorder::attached();
     idle.message(leave());
     idle.expect(&[DRAIN]);
-    idle.dismissed();
+    idle.dismiss();
 }
 
 #[test]
@@ -354,7 +354,7 @@ fn a_worker_without_work_leaves_after_its_idle_timeout() {
     worker.expect(&[HEARTBEAT]);
     worker.tick_at(23.0);
     worker.expect(&[DRAIN]);
-    worker.dismissed();
+    worker.dismiss();
 }
 
 #[test]
