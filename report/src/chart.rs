@@ -108,13 +108,13 @@ impl Axis {
     }
 
     /// An axis with a place for each name.
-    pub(crate) fn of_categories(label: impl Into<String>, names: Vec<String>) -> Self {
+    pub(crate) fn with_categories(label: impl Into<String>, names: Vec<String>) -> Self {
         let range = Some([-0.5, names.len().max(1) as f64 - 0.5]);
         Self { range, categories: names, ..Self::linear(label) }
     }
 
     /// The same axis with these ends.
-    pub(crate) fn spanning(self, low: f64, high: f64) -> Self {
+    pub(crate) fn with_ends(self, low: f64, high: f64) -> Self {
         Self { range: Some([low, high]), ..self }
     }
 }
@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn categories_are_named_in_the_table() {
         let names = vec!["a".to_owned(), "b, c".to_owned()];
-        let y = Axis::of_categories("group", names);
+        let y = Axis::with_categories("group", names);
         let mut chart = Chart::new("a", "A", Axis::linear("x"), y);
         chart.layer("95 %", Ink::First, Shape::Intervals(vec![[1.0, 2.0, 1.0]]));
         assert!(chart.csv().ends_with("95 %,\"b, c\",1.0,2.0,1.0,\n"), "{}", chart.csv());

@@ -54,12 +54,12 @@ impl Unit {
             Precision::Unknown => number::digits(value, DIGITS),
             Precision::Free => number::digits(value, FREE_DIGITS),
             Precision::Digits(digits) => number::digits(value, digits),
-            Precision::Given => number::given(value),
+            Precision::Given => number::format_given(value),
         }
     }
 
     /// Returns a name with this unit in brackets, for an axis.
-    pub(crate) fn after(&self, name: &str) -> String {
+    pub(crate) fn axis_label(&self, name: &str) -> String {
         if self.name.is_empty() { name.to_owned() } else { format!("{name} ({})", self.name) }
     }
 }
@@ -96,7 +96,6 @@ pub(crate) fn words(parameter: Parameter) -> &'static str {
     }
 }
 
-/// Returns the symbol of a parameter.
 pub(crate) fn symbol(parameter: Parameter) -> &'static str {
     match parameter {
         Parameter::Density => "ρ",

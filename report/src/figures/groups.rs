@@ -73,7 +73,7 @@ fn figure(
     places: &[ForestRow],
 ) -> Figure {
     let names = findings.iter().map(|one| one.group.unwrap_or_default().to_owned()).collect();
-    let y = Axis::of_categories("", names);
+    let y = Axis::with_categories("", names);
     let mut chart = Chart::new(name, title, Axis::linear(label), y);
     chart.height = (0.1 * places.len() as f64).max(0.35);
     let rows = || places.iter().enumerate();

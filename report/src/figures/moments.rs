@@ -17,7 +17,7 @@ const FEWEST: f64 = 5.0;
 pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let Some(sample) = &finding.model.velocities else { return Vec::new() };
     let running: Vec<Running> =
-        sample.running(STEPS).into_iter().filter(|one| one.count >= FEWEST).collect();
+        sample.running_moments(STEPS).into_iter().filter(|one| one.count >= FEWEST).collect();
     if running.len() < 2 {
         return Vec::new();
     }

@@ -11,7 +11,7 @@ pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let figure = |(parameter, profile): (&_, &osteon_files::report::ParameterProfile)| {
         let parameter = *parameter;
         let unit = unit(parameter);
-        let label = unit.after(&format!("{} {}", words(parameter), symbol(parameter)));
+        let label = unit.axis_label(&format!("{} {}", words(parameter), symbol(parameter)));
         let points = profile.values.iter().zip(&profile.costs);
         let points: Vec<[f64; 2]> =
             points.map(|(value, cost)| [value / unit.size, cost.unwrap_or(f64::NAN)]).collect();

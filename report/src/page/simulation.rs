@@ -17,7 +17,7 @@ pub(super) fn table(numbers: &Numbers, result: &Simulation) -> String {
     ]];
     let mut add = |name: &str, value: Option<f64>, place: &str, unit: Unit| {
         let shown = numbers.number(value, place, unit, digits(5));
-        rows.push(vec![unit.after(name), shown]);
+        rows.push(vec![unit.axis_label(name), shown]);
     };
     for (place, name) in ["velocity from the first source", "velocity from the second source"]
         .into_iter()
