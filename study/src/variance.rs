@@ -9,7 +9,7 @@ use osteon_common::results::{Estimate, Moments};
 use osteon_common::statistics;
 use osteon_solver::{Isa, Solver};
 
-use crate::draws::{OPTIMUM, solved};
+use crate::draws::{OPTIMUM, solve_realizations};
 use crate::table::{MarkdownTable, two_digits};
 use crate::{RowCallback, StudyError};
 
@@ -111,7 +111,7 @@ pub fn scatter(
     for seed in repetitions.first..repetitions.first + repetitions.seeds {
         let plain = MonteCarlo { realizations, seed, sampling, scrambles, ..MonteCarlo::default() };
         let ensemble = Ensemble::drawn(point, plain.germs())?;
-        let solved = solved(&solver, &ensemble, realizations);
+        let solved = solve_realizations(&solver, &ensemble, realizations);
         let outcomes: Vec<_> = solved.into_iter().map(|one| one.outcome).collect();
         failed += outcomes.iter().filter(|outcome| outcome.is_err()).count();
         for (estimates, control_variate) in estimates.iter_mut().zip([false, true]) {

@@ -25,7 +25,7 @@ const OUTLIERS: f64 = 0.01;
 const HALF_FREEDOM: usize = 3;
 
 /// Returns the data of parameter set `number`; `None` if too many realizations fail.
-pub(super) fn simulated(
+pub(super) fn simulate_data(
     study: &PosteriorCalibration,
     truth: &Point,
     number: u64,
@@ -44,10 +44,10 @@ pub(super) fn simulated(
     }
     velocities.truncate(count as usize);
     let mut generator = Generator::for_index(!study.seed, number);
-    Ok(Some(changed(study, velocities, subjects as usize, &mut generator)))
+    Ok(Some(change_data(study, velocities, subjects as usize, &mut generator)))
 }
 
-fn changed(
+fn change_data(
     study: &PosteriorCalibration,
     velocities: Vec<f64>,
     subjects: usize,
@@ -112,7 +112,7 @@ mod tests {
             seed: 3,
             isa: Isa::fastest(),
         };
-        simulated(&study, &OPTIMUM, 0).unwrap().unwrap()
+        simulate_data(&study, &OPTIMUM, 0).unwrap().unwrap()
     }
 
     #[test]
