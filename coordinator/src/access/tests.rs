@@ -31,7 +31,7 @@ const NEEDS: [(&str, Requirement); 17] = [
 #[test]
 fn every_method_asks_for_something() {
     for (path, expected) in NEEDS {
-        assert_eq!(need(path), expected, "{path}");
+        assert_eq!(requirement(path), expected, "{path}");
     }
     for (path, expected) in [
         // A method that is added later has the strictest requirement until one is chosen for it.
@@ -44,7 +44,7 @@ fn every_method_asks_for_something() {
         ("/", Requirement::Known),
         ("", Requirement::Known),
     ] {
-        assert_eq!(need(path), expected, "{path}");
+        assert_eq!(requirement(path), expected, "{path}");
     }
 }
 
@@ -213,6 +213,6 @@ fn the_page_is_for_everybody_and_its_data_need_the_role_of_the_api() {
         ("/data/new", Requirement::Known),
         ("//", Requirement::Known),
     ] {
-        assert_eq!(page_need(path), requirement, "{path}");
+        assert_eq!(page_requirement(path), requirement, "{path}");
     }
 }

@@ -120,20 +120,20 @@ mod tests {
         for (fraction, least, most) in
             [(0.0, 0, 0), (0.01, 70, 130), (0.5, 4800, 5200), (1.0, 10_000, 10_000)]
         {
-            let chosen = chosen(&AuditKey([7; 32]), fraction).len();
+            let chosen = chosen_batches(&AuditKey([7; 32]), fraction).len();
             assert!((least..=most).contains(&chosen), "{chosen} at {fraction}");
         }
     }
 
     /// Returns which of many batches are chosen.
-    fn chosen(key: &AuditKey, fraction: f64) -> Vec<u64> {
+    fn chosen_batches(key: &AuditKey, fraction: f64) -> Vec<u64> {
         let of = |i: &u64| is_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
         (0..10_000).filter(of).collect()
     }
 
     /// Returns the fraction of the realizations that is audited, and the most that a worker computes between
     /// two audits, over many batches of this size.
-    fn audited(fraction: f64, slots: u32, count: u64) -> (f64, u64) {
+    fn audited_share(fraction: f64, slots: u32, count: u64) -> (f64, u64) {
         let mut due = NextAudit::first((&AuditKey([7; 32]), fraction), LeaseId(1), slots);
         let (mut audited, mut since, mut longest) = (0, 0, 0);
         let batches = 400_000 / count;
@@ -164,21 +164,21 @@ mod tests {
             (0.3, 2, 40),
             (0.01, 4, 50),
         ] {
-            let (found, longest) = audited(fraction, slots, count);
+            let (found, longest) = audited_share(fraction, slots, count);
             assert!((0.9..1.15).contains(&(found / fraction)), "{found} of {fraction}");
             let most = 2.0 * f64::from(slots).max(fraction * count as f64 + 1.0) / fraction;
             assert!(longest as f64 <= most + count as f64, "{longest}, {most} with {count}");
         }
-        assert_eq!(audited(0.0, 1, 100).0, 0.0);
-        assert_eq!(audited(1.0, 8, 3).0, 1.0);
-        assert_eq!(audited(1.0, 1, 100).0, 1.0);
+        assert_eq!(audited_share(0.0, 1, 100).0, 0.0);
+        assert_eq!(audited_share(1.0, 8, 3).0, 1.0);
+        assert_eq!(audited_share(1.0, 1, 100).0, 1.0);
     }
 
     #[test]
     fn who_does_not_know_the_key_does_not_know_the_choice() {
         let keys = [AuditKey::default(), AuditKey::random().unwrap(), AuditKey::random().unwrap()];
         assert_ne!(keys[1], keys[2]);
-        let [known, one, other] = keys.map(|key| chosen(&key, 0.5));
+        let [known, one, other] = keys.map(|key| chosen_batches(&key, 0.5));
         for (one, other) in [(&known, &one), (&known, &other), (&one, &other)] {
             let both = one.iter().filter(|i| other.contains(i)).count();
             // A quarter of 10,000, with a standard deviation of 43.

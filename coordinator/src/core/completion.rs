@@ -39,7 +39,6 @@ pub struct Completed {
     pub(crate) job: JobId,
     /// Number of the attempt at it.
     pub(crate) attempt: u64,
-    /// The search after it.
     pub(crate) after: Box<Search>,
 }
 

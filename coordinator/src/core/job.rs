@@ -137,16 +137,17 @@ impl Job {
 
     /// Returns all evaluations under way; the one that the search asked for comes first.
     pub(crate) fn evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
-        self.certain().chain(&self.speculation.evaluations)
+        self.certain_evaluations().chain(&self.speculation.evaluations)
     }
 
     /// Returns the evaluation that the search asked for, and those that it will ask for.
-    pub(crate) fn certain(&self) -> impl Iterator<Item = &PendingEvaluation> {
+    pub(crate) fn certain_evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
         self.evaluation().into_iter().chain(self.ahead.evaluations())
     }
 
-    /// As [`Job::certain`].
-    pub(crate) fn certain_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
+    pub(crate) fn certain_evaluations_mut(
+        &mut self,
+    ) -> impl Iterator<Item = &mut PendingEvaluation> {
         let asked_for = match &mut self.stage {
             Stage::Computing(evaluation) => Some(evaluation),
             _ => None,
@@ -154,17 +155,18 @@ impl Job {
         asked_for.into_iter().chain(self.ahead.evaluations_mut())
     }
 
-    /// Returns the one of [`Job::certain`] with this attempt.
-    pub(crate) fn certain_with(&self, attempt: u64) -> Option<&PendingEvaluation> {
-        self.certain().find(|evaluation| evaluation.attempt == attempt)
+    /// Returns the one of [`Job::certain_evaluations`] with this attempt.
+    pub(crate) fn certain_evaluation(&self, attempt: u64) -> Option<&PendingEvaluation> {
+        self.certain_evaluations().find(|evaluation| evaluation.attempt == attempt)
     }
 
-    /// As [`Job::certain_with`].
-    pub(crate) fn certain_with_mut(&mut self, attempt: u64) -> Option<&mut PendingEvaluation> {
-        self.certain_mut().find(|evaluation| evaluation.attempt == attempt)
+    pub(crate) fn certain_evaluation_mut(
+        &mut self,
+        attempt: u64,
+    ) -> Option<&mut PendingEvaluation> {
+        self.certain_evaluations_mut().find(|evaluation| evaluation.attempt == attempt)
     }
 
-    /// As [`Job::evaluations`].
     pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
         let asked_for = match &mut self.stage {
             Stage::Computing(evaluation) => Some(evaluation),
@@ -214,7 +216,6 @@ pub(crate) enum Stage {
     Completing(Settled),
     /// A complete evaluation is being stored.
     StoringEvaluation {
-        /// The evaluation.
         record: EvaluationRecord,
         /// Evaluations stored after it belong to another path of the search and are deleted.
         is_last: bool,
@@ -372,7 +373,6 @@ impl RequestName {
     }
 }
 
-/// Digest of a specification.
 pub(crate) type SpecificationDigest = [u8; 32];
 
 /// Returns the digest of a specification; different specifications have different digests.

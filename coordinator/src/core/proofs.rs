@@ -55,7 +55,6 @@ pub(crate) struct SetupProofs {
     input: Arc<EvaluationInput>,
     /// The votes of the hosts.
     pub(crate) ballot: Ballot,
-    /// The batches that are out.
     pub(crate) out: BTreeMap<WorkerId, BatchId>,
     /// The workers that have given theirs, in this stay or an earlier one.
     given: BTreeSet<WorkerName>,
@@ -107,12 +106,10 @@ impl SetupProofs {
 pub(crate) struct Proofs(BTreeMap<SetupKey, SetupProofs>);
 
 impl Proofs {
-    /// Returns the proofs of a setup.
     pub(crate) fn for_setup(&self, setup: &SetupKey) -> Option<&SetupProofs> {
         self.0.get(setup)
     }
 
-    /// As [`Proofs::for_setup`].
     pub(crate) fn for_setup_mut(&mut self, setup: &SetupKey) -> Option<&mut SetupProofs> {
         self.0.get_mut(setup)
     }

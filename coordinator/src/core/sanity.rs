@@ -86,7 +86,7 @@ pub fn sanity_check(state: &State) -> Result<(), Inconsistency> {
     check_jobs(state)?;
     check_workers(state)?;
     check_batches(state)?;
-    if let Some(worker) = state.misplaced() {
+    if let Some(worker) = state.find_misplaced() {
         return Err(Inconsistency::Order(worker));
     }
     for (&id, job) in &state.jobs {
@@ -176,7 +176,7 @@ fn check_ahead(state: &State, job: &Job) -> Result<(), Inconsistency> {
     };
     let banned = state.banned.iter().filter(|banned| banned.record.lifted.is_none());
     let banned = banned.map(|banned| banned.record.worker.host());
-    let mut prepared = job.ahead.all_prepared();
+    let mut prepared = job.ahead.prepared_evaluations();
     let fits = parts.clone().is_sorted()
         && parts.all(|of| of >= part && of < job.ahead.next_part)
         && branches.iter().all(at_its_point)
@@ -297,7 +297,7 @@ fn check_batches(state: &State) -> Result<(), Inconsistency> {
             continue;
         }
         let job = state.jobs.get(&batch.assignment.job);
-        let asked_for = job.is_some_and(|job| job.certain_with(attempt).is_some());
+        let asked_for = job.is_some_and(|job| job.certain_evaluation(attempt).is_some());
         let speculative = job
             .is_some_and(|job| job.speculation.evaluations.iter().any(|it| it.attempt == attempt));
         if asked_for == speculative || (batch.purpose == Purpose::Speculative) != speculative {

@@ -19,7 +19,7 @@ const UNFIT_SHOWN_MAX: usize = 3;
 /// Returns the snapshot of `id` at `now`; `None` if no client can know the job yet.
 pub(crate) fn job_snapshot(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot> {
     if let Some(job) = state.ended.get(&id) {
-        return Some(ended(state, job));
+        return Some(ended_snapshot(state, job));
     }
     let job = state.jobs.get(&id)?;
     let specification = &job.record.specification;
@@ -58,7 +58,7 @@ pub(crate) fn job_snapshot(state: &State, id: JobId, now: Duration) -> Option<Jo
     Some(snapshot)
 }
 
-fn ended(state: &State, job: &EndedJob) -> JobSnapshot {
+fn ended_snapshot(state: &State, job: &EndedJob) -> JobSnapshot {
     let end = &job.end;
     let mut snapshot = JobSnapshot {
         job: end.job.to_string(),
@@ -104,11 +104,11 @@ fn under_way(state: &State, job: &Job, now: Duration, snapshot: &mut JobSnapshot
     snapshot.best_coefficient_of_variation =
         moments.map(|moments| moments.coefficient_of_variation);
     snapshot.realizations_per_second = job.rate.per_second(now);
-    snapshot.waiting_for = waiting_for(state, job, now);
+    snapshot.waiting_for = describe_wait(state, job, now);
 }
 
 /// Describes what a job that has not ended waits for; empty if it does not wait.
-fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
+fn describe_wait(state: &State, job: &Job, now: Duration) -> String {
     let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
     if let Some(store_retry) = &job.store_retry {
         let does = match job.stage {

@@ -186,7 +186,6 @@ pub(crate) struct EarlyAnswer {
 /// Consecutive batches of a worker that others answered, long after it should have.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct MissedBatches {
-    /// Their number.
     pub(crate) count: u32,
     /// Time when the worker could begin the first of them; meaningless while there is none.
     pub(crate) since: Duration,
@@ -234,11 +233,11 @@ impl State {
 
     /// Returns whether nothing is left to do.
     pub fn is_idle(&self) -> bool {
-        self.active.is_empty() && self.waiting.is_empty() && self.unstored() == 0
+        self.active.is_empty() && self.waiting.is_empty() && self.unstored_records() == 0
     }
 
     /// Returns the number of jobs that have not ended.
-    pub(crate) fn unfinished(&self) -> usize {
+    pub(crate) fn unfinished_jobs(&self) -> usize {
         self.jobs.len()
     }
 
@@ -255,7 +254,7 @@ impl State {
     }
 
     /// Returns the number of records on their way to the store.
-    pub(crate) fn unstored(&self) -> usize {
+    pub(crate) fn unstored_records(&self) -> usize {
         let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
         let banned = self.banned.iter().filter(on_its_way).count();
         let jobs =
@@ -304,7 +303,6 @@ impl State {
         job.evaluations().find(|found| found.attempt == assignment.attempt)
     }
 
-    /// As [`State::evaluation_of`].
     pub(crate) fn evaluation_of_mut(
         &mut self,
         assignment: &Assignment,

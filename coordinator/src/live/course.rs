@@ -15,7 +15,7 @@ use crate::core::effect::{Answer, SearchRows};
 use crate::core::event::Request;
 use crate::core::ids::JobId;
 use crate::live::json;
-use crate::live::source::{PageSource, unexpected};
+use crate::live::source::{PageSource, unexpected_status};
 use crate::service::fetching;
 use crate::store::job_output::ReadRequest;
 
@@ -26,7 +26,6 @@ const READINGS_MAX: usize = 8;
 /// Maximum number of groups that are named.
 const GROUPS_MAX: usize = 200;
 
-/// A search that is followed.
 pub(crate) struct FollowedSearch {
     job: JobId,
     /// The group that is wanted; the one that the search is at, if none is.
@@ -102,7 +101,7 @@ impl FollowedSearch {
                 (self.add(specification, new), rows.len() == ROWS_MAX)
             }
             Answer::Ended { .. } => {
-                let _permit = source.reading(caller).await?;
+                let _permit = source.permit_reading(caller).await?;
                 let job = self.job;
                 let record = fetching::read(&source.store, |to| ReadRequest::Job(job, to)).await?;
                 let summary = fetching::read(&source.store, |to| ReadRequest::Summary(job, to));
@@ -111,7 +110,7 @@ impl FollowedSearch {
                 self.seen = None;
                 (self.add(record.specification, &rows), false)
             }
-            _ => return Err(unexpected()),
+            _ => return Err(unexpected_status()),
         };
         if is_other_set {
             self.summarize().await;
@@ -124,7 +123,7 @@ impl FollowedSearch {
         let mut is_new = self.seen.is_none();
         self.is_stale |= is_new || !rows.is_empty();
         let begun = |specification: Arc<JobSpecification>, set: usize| SeenRows {
-            course: SearchCourse::of_job(&specification, set),
+            course: SearchCourse::for_job(&specification, set),
             specification,
             set,
             count: 0,

@@ -129,7 +129,7 @@ pub(crate) async fn serve(
     tls: Option<watch::Receiver<Tls>>,
     router: Router,
 ) {
-    let mut acceptor = Acceptor::of_pages(listener.listener, tls, CONNECTIONS_MAX);
+    let mut acceptor = Acceptor::for_pages(listener.listener, tls, CONNECTIONS_MAX);
     let mut connections = JoinSet::new();
     loop {
         let connection = acceptor.next().await;

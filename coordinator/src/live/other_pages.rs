@@ -59,7 +59,6 @@ pub fn is_cross_site(headers: &HeaderMap, method: &Method, host: &str) -> bool {
     }
 }
 
-/// Returns a host without its port.
 fn without_port(host: &str) -> &str {
     match host.rsplit_once(':') {
         // The colons of an address are in brackets.

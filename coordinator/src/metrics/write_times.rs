@@ -11,7 +11,6 @@ use crate::core::distribution::TimeDistribution;
 pub(crate) struct WriteTimes(Arc<Mutex<TimeDistribution>>);
 
 impl WriteTimes {
-    /// Counts a write.
     pub(crate) fn add(&self, time: Duration) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).add(time);
     }

@@ -76,7 +76,7 @@ impl ControlFrames {
     }
 
     /// Notes bytes that were sent to the peer.
-    pub(crate) fn sent(&mut self, bytes: usize) {
+    pub(crate) fn note_sent(&mut self, bytes: usize) {
         let most = UPDATES_MAX * BYTES_PER_UPDATE;
         let unpaid = self.unpaid + u32::try_from(bytes).unwrap_or(most).min(most);
         self.unpaid = unpaid % BYTES_PER_UPDATE;
@@ -87,7 +87,7 @@ impl ControlFrames {
     ///
     /// # Errors
     /// When a control frame in them is one too many.
-    pub(crate) fn arrived(&mut self, mut bytes: &[u8]) -> Result<(), TooManyControlFrames> {
+    pub(crate) fn follow_arrived(&mut self, mut bytes: &[u8]) -> Result<(), TooManyControlFrames> {
         while !bytes.is_empty() {
             if self.skip > 0 {
                 let skipped = bytes.len().min(self.skip as usize);

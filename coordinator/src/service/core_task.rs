@@ -25,7 +25,6 @@ use crate::store::thread::StoreCommand;
 
 /// A message to the core task.
 pub(crate) enum Message {
-    /// An event happened.
     Event(Event),
     /// A client sends a request and waits for the answer.
     Ask(Request, oneshot::Sender<Answer>),
@@ -34,7 +33,11 @@ pub(crate) enum Message {
     /// A client requests to watch a job.
     Watch(JobId, oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>),
     /// A worker's stream began; messages to it go to `outbound`.
-    Attach { worker: WorkerId, hello: Hello, outbound: Outbound },
+    Attach {
+        worker: WorkerId,
+        hello: Hello,
+        outbound: Outbound,
+    },
     /// Metrics are to be exported.
     Measure(oneshot::Sender<CoreReport>),
     /// Stop, and report when that is done.
@@ -131,10 +134,10 @@ impl Core {
     ) {
         let mut followups = VecDeque::new();
         if let Some(meter) = &mut self.meter {
-            meter.started(&self.state, &effects, self.clock.now());
+            meter.count_start(&self.state, &effects, self.clock.now());
         }
         if let Some(spans) = &mut self.spans {
-            spans.after(&self.state, &effects, self.clock.now());
+            spans.observe_reaction(&self.state, &effects, self.clock.now());
         }
         self.apply(effects, &mut followups);
         self.handle(followups);
@@ -151,7 +154,7 @@ impl Core {
     }
 
     fn tick(&mut self) {
-        let (open, most) = self.places.taken();
+        let (open, most) = self.places.usage();
         self.handle(VecDeque::from([Event::Connections { open, most }, Event::Tick]));
     }
 
@@ -165,7 +168,7 @@ impl Core {
             Message::Submit(request, client, reply) => {
                 let reply_id = self.expect(reply);
                 if let Some(spans) = &mut self.spans {
-                    spans.submitted(reply_id, client, self.clock.now());
+                    spans.note_submission(reply_id, client, self.clock.now());
                 }
                 self.handle(VecDeque::from([Event::Requested { reply_id, request }]));
             }
@@ -202,14 +205,14 @@ impl Core {
             let now = self.clock.now();
             let reading = self.meter.as_mut().map(|meter| meter.begin(&self.state, &event, now));
             if let Some(spans) = &mut self.spans {
-                spans.before(&event, now);
+                spans.observe_event(&event, now);
             }
             let effects = react(&mut self.state, event, now);
             if let Some(spans) = &mut self.spans {
-                spans.after(&self.state, &effects, now);
+                spans.observe_reaction(&self.state, &effects, now);
             }
             if let Some((meter, reading)) = self.meter.as_mut().zip(reading.as_ref()) {
-                meter.reacted(reading, &self.state, &effects, now);
+                meter.count_reaction(reading, &self.state, &effects, now);
             }
             self.apply(effects, &mut events);
             if let Some((meter, reading)) = self.meter.as_mut().zip(reading) {

@@ -157,28 +157,28 @@ async fn answer(request: &Request<Incoming>, sources: &MetricSources) -> Respons
     let get = [Method::GET, Method::HEAD].contains(request.method());
     match request.uri().path() {
         METRICS_PATH if !get => {
-            let mut refused = plain(StatusCode::METHOD_NOT_ALLOWED, "only GET and HEAD\n");
+            let mut refused = plain_response(StatusCode::METHOD_NOT_ALLOWED, "only GET and HEAD\n");
             refused
                 .headers_mut()
                 .insert(ALLOW, hyper::header::HeaderValue::from_static("GET, HEAD"));
             refused
         }
         METRICS_PATH => match sources.text().await {
-            Some(text) => typed(StatusCode::OK, exposition::CONTENT_TYPE, text),
-            None => plain(
+            Some(text) => typed_response(StatusCode::OK, exposition::CONTENT_TYPE, text),
+            None => plain_response(
                 StatusCode::SERVICE_UNAVAILABLE,
                 "the coordinator does not answer; its log may say why\n",
             ),
         },
-        _ => plain(StatusCode::NOT_FOUND, "the metrics are at /metrics\n"),
+        _ => plain_response(StatusCode::NOT_FOUND, "the metrics are at /metrics\n"),
     }
 }
 
-fn plain(status: StatusCode, text: &'static str) -> Response<Full<Bytes>> {
-    typed(status, "text/plain; charset=utf-8", text)
+fn plain_response(status: StatusCode, text: &'static str) -> Response<Full<Bytes>> {
+    typed_response(status, "text/plain; charset=utf-8", text)
 }
 
-fn typed(
+fn typed_response(
     status: StatusCode,
     content_type: &'static str,
     text: impl Into<Bytes>,

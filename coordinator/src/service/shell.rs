@@ -171,9 +171,9 @@ pub async fn start(
     let config = Config { audit_key, ..config };
     let clock = Clock::new();
     tracing::info!(
-        unfinished_jobs = restored.unfinished(),
-        ended_jobs = restored.ended(),
-        banned_workers = restored.banned(),
+        unfinished_jobs = restored.unfinished_jobs(),
+        ended_jobs = restored.ended_jobs(),
+        banned_workers = restored.banned_workers(),
         "jobs recovered from the store"
     );
     let (state, effects) = State::restore(config, restored, clock.now());
@@ -202,15 +202,15 @@ pub async fn start(
     let router = services(&messages, &commands, decided, config).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
-    let places = Places::of_coordinator();
+    let places = Places::for_coordinator();
     let server = serve(router, listener, shown, places.clone(), stopped);
-    let server = tokio::spawn(guarded(failing.guard(ComponentFailure::Server), server));
+    let server = tokio::spawn(run_guarded(failing.guard(ComponentFailure::Server), server));
     let guard = failing.guard(ComponentFailure::Core);
     let meter = (metrics.is_some() || page.is_some()).then(Meter::default);
     let monitoring = Monitoring { meter, spans: listener_spans.map(JobSpans::new) };
     let core = Core::new(state, clock, commands, events, places, failing.clone(), monitoring);
     let core = core.run(effects, inbox, from_store, config.tick);
-    let core = tokio::spawn(guarded(guard, core));
+    let core = tokio::spawn(run_guarded(guard, core));
     tracing::info!(%url, "listening");
     Ok(Coordinator {
         url,
@@ -313,7 +313,7 @@ impl Coordinator {
     }
 }
 
-async fn guarded(guard: Guard, part: impl Future<Output = ()>) {
+async fn run_guarded(guard: Guard, part: impl Future<Output = ()>) {
     part.await;
     drop(guard);
 }

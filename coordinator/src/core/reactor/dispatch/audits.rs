@@ -43,19 +43,21 @@ fn audit_for(
     name: &WorkerName,
 ) -> Option<(Audit, u64)> {
     let of_others = |audit: &Audit| audit.by.host() != name.host();
-    let (attempt, at, audited) = state.jobs.get(&job)?.certain().find_map(|evaluation| {
-        let at = evaluation.audits.iter().position(of_others)?;
-        Some((evaluation.attempt, at, evaluation.audits.get(at)?.indices.count))
-    })?;
+    let (attempt, at, audited) =
+        state.jobs.get(&job)?.certain_evaluations().find_map(|evaluation| {
+            let at = evaluation.audits.iter().position(of_others)?;
+            Some((evaluation.attempt, at, evaluation.audits.get(at)?.indices.count))
+        })?;
     let most = if schedule::next_job(state).is_some() {
         audited
     } else {
         let fleet = sizing::fleet_rate(state, job);
-        let all = state.jobs.get(&job)?.certain().flat_map(|evaluation| &evaluation.audits);
+        let all =
+            state.jobs.get(&job)?.certain_evaluations().flat_map(|evaluation| &evaluation.audits);
         let waiting = all.map(|audit| audit.indices.count).sum();
         sizing::audit_size(state.workers.get(&worker)?, job, fleet, (audited, waiting))
     };
-    let evaluation = state.jobs.get_mut(&job)?.certain_with_mut(attempt)?;
+    let evaluation = state.jobs.get_mut(&job)?.certain_evaluation_mut(attempt)?;
     evaluation.audits_out += 1;
     let audit = evaluation.audits.get_mut(at)?;
     let part = Audit { indices: audit.indices.take(most), ..audit.clone() };

@@ -37,8 +37,8 @@ pub(crate) fn dispatch(turn: &mut Turn) -> BTreeSet<WorkerId> {
     let mut kept = BTreeSet::new();
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
     for job in active {
-        while let Some((index, worker)) = next(turn.state, job, turn.now) {
-            let holds = |worker: &AttachedWorker| turn.state.held(worker) > 0;
+        while let Some((index, worker)) = choose_quarantined(turn.state, job, turn.now) {
+            let holds = |worker: &AttachedWorker| turn.state.batches_held(worker) > 0;
             if turn.state.workers.get(&worker).is_none_or(holds) {
                 kept.insert(worker);
                 break;
@@ -51,7 +51,7 @@ pub(crate) fn dispatch(turn: &mut Turn) -> BTreeSet<WorkerId> {
 }
 
 /// Chooses the next quarantined realization of a job that may be sent, and its worker.
-fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
+fn choose_quarantined(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let crashes = |index: &u64| evaluation.crashes.get(index);
     let open = |index: &&u64| {
@@ -67,7 +67,7 @@ fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
 /// that has not answered anything yet must first answer other work, if there is any.
 fn choose_worker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
     let rank = |(id, worker): &(&WorkerId, &AttachedWorker)| {
-        let held = if crashes.is_empty() { state.held(worker) } else { 0 };
+        let held = if crashes.is_empty() { state.batches_held(worker) } else { 0 };
         (reputation(state, worker, crashes), held, **id)
     };
     let takers = state.workers.iter().filter(|(_, worker)| !worker.draining);

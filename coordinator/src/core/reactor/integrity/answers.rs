@@ -23,7 +23,7 @@ use crate::core::worker_name::WorkerName;
 /// Takes in a worker's answer. If the batch was settled before (a duplicate was faster, or the
 /// answer came twice), the answer is only compared with the known results; the answer to an unknown
 /// batch is ignored.
-pub(crate) fn answered(
+pub(crate) fn take_answer(
     turn: &mut Turn,
     worker: WorkerId,
     batch: BatchId,
@@ -60,7 +60,7 @@ pub(crate) fn answered(
         return;
     }
     if purpose.is_some() {
-        overdue::answered(turn.state, worker, batch, turn.now);
+        overdue::note_answer(turn.state, worker, batch, turn.now);
     }
     match purpose {
         Some(Purpose::Fill | Purpose::Exclusive | Purpose::Speculative) => {
@@ -78,11 +78,11 @@ pub(crate) fn answered(
         }
         Some(Purpose::TieBreak) => {
             take_back(turn, duplicates);
-            checks::tie_broken(turn, batch, &assignment, solved, &name);
+            checks::take_tie_break(turn, batch, &assignment, solved, &name);
         }
         Some(Purpose::Proof) => {
             learn_pace(turn.state, &assignment, worker, elapsed_s);
-            checks::proven(turn, (worker, batch), &assignment, solved, &name);
+            checks::take_proof(turn, (worker, batch), &assignment, solved, &name);
             take_early(turn, worker);
         }
         None => checks::compare(turn, &assignment, &solved, &name),
@@ -137,7 +137,7 @@ fn take_early(turn: &mut Turn, worker: WorkerId) {
     let attached = turn.state.workers.get_mut(&worker);
     let early = attached.map(|attached| std::mem::take(&mut attached.early));
     for EarlyAnswer { batch, solved, elapsed_s } in early.unwrap_or_default() {
-        answered(turn, worker, batch, solved, elapsed_s);
+        take_answer(turn, worker, batch, solved, elapsed_s);
     }
 }
 
@@ -168,7 +168,7 @@ fn learn_pace(state: &mut State, assignment: &Assignment, worker: WorkerId, elap
 /// Revokes the duplicates of a batch that was answered.
 fn take_back(turn: &mut Turn, duplicates: Vec<BatchId>) {
     for duplicate in duplicates {
-        overdue::missed(turn.state, duplicate, turn.now);
+        overdue::count_missed(turn.state, duplicate, turn.now);
         batches::revoke(turn, duplicate);
     }
 }
@@ -186,7 +186,8 @@ fn fill(
     let before = evaluation.filled();
     evaluation.fill(assignment.indices, solved, by);
     let news = evaluation.filled() - before;
-    let asked_for = |job: &&mut Job| job.certain().any(|it| it.attempt == assignment.attempt);
+    let asked_for =
+        |job: &&mut Job| job.certain_evaluations().any(|it| it.attempt == assignment.attempt);
     if let Some(job) = state.jobs.get_mut(&assignment.job).filter(asked_for) {
         job.rate.add(news, now);
         job.progressed = now;

@@ -57,7 +57,7 @@ pub(crate) fn expire(turn: &mut Turn) {
         .state
         .workers
         .iter()
-        .filter_map(|(id, worker)| Some((*id, expired(turn.state, worker, turn.now)?)))
+        .filter_map(|(id, worker)| Some((*id, lease_end_reason(turn.state, worker, turn.now)?)))
         .collect();
     for (worker, reason) in expired {
         workers::close(turn, worker, reason);
@@ -65,7 +65,7 @@ pub(crate) fn expire(turn: &mut Turn) {
 }
 
 /// Returns the reason why the lease of a worker has ended, if it has.
-fn expired(state: &State, worker: &AttachedWorker, now: Duration) -> Option<CloseReason> {
+fn lease_end_reason(state: &State, worker: &AttachedWorker, now: Duration) -> Option<CloseReason> {
     let silent = now.saturating_sub(worker.last_seen);
     if silent > state.config.expiry {
         return Some(CloseReason::Expired { silent });
@@ -121,7 +121,8 @@ pub(crate) fn save_parts(turn: &mut Turn, before_stop: bool) {
         let Some(job) = turn.state.jobs.get_mut(id) else {
             continue;
         };
-        for evaluation in job.certain_mut().filter(|it| !unproven.contains(&it.attempt)) {
+        for evaluation in job.certain_evaluations_mut().filter(|it| !unproven.contains(&it.attempt))
+        {
             let save_at = *evaluation.save_at.get_or_insert(now + SAVE_AFTER);
             if (before_stop || now >= save_at)
                 && let Some(part) = saved::take_unsaved(evaluation, *id, most)
