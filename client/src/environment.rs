@@ -61,10 +61,10 @@ impl Environment {
     /// # Errors
     /// Same as [`from_process`](Self::from_process).
     pub fn read(variable: impl Fn(&str) -> Option<OsString>) -> Result<Self, EnvironmentError> {
-        let given = |name| variable(name).filter(|value| !value.is_empty());
-        let file = |name| given(name).map(PathBuf::from);
+        let read_nonempty = |name| variable(name).filter(|value| !value.is_empty());
+        let file = |name| read_nonempty(name).map(PathBuf::from);
         let text = |name| {
-            let text = given(name).map(OsString::into_string).transpose();
+            let text = read_nonempty(name).map(OsString::into_string).transpose();
             text.map_err(|value| EnvironmentError::NotUnicode { variable: name, value })
         };
         Ok(Self {
@@ -116,12 +116,12 @@ impl Environment {
         let encrypted = matches!(endpoint, Endpoint::Https(_));
         let private = encrypted || endpoint.is_local();
         let own = options.certificate.is_some() || options.key.is_some();
-        let found = |file: &Option<PathBuf>, wanted: bool| file.clone().filter(|_| wanted);
+        let file_if = |file: &Option<PathBuf>, wanted: bool| file.clone().filter(|_| wanted);
         let wanted = CredentialFiles {
-            ca: found(&self.files.ca, encrypted && options.ca.is_none()),
-            certificate: found(&self.files.certificate, encrypted && !own),
-            key: found(&self.files.key, encrypted && !own),
-            token: found(&self.files.token, private && options.token.is_none()),
+            ca: file_if(&self.files.ca, encrypted && options.ca.is_none()),
+            certificate: file_if(&self.files.certificate, encrypted && !own),
+            key: file_if(&self.files.key, encrypted && !own),
+            token: file_if(&self.files.token, private && options.token.is_none()),
         };
         match &self.coordinator {
             Some(other) if !is_at(other, endpoint) => (options, Unused::from_files(&wanted)),

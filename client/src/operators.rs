@@ -99,7 +99,7 @@ pub async fn health(
     let connected = async {
         let credentials = load_credentials(&files, endpoint).await?;
         let connected = connection::connect_with(endpoint, &credentials, limit);
-        // The connection keeps the limit by itself; what it took is no longer left for the answer.
+        // The connection keeps the limit by itself. The time that it took is lost for the answer.
         let late =
             |_| ConnectError::Timeout { endpoint: endpoint.clone(), seconds: limit.as_secs_f64() };
         Ok(patience.wait_for(connected).await.map_err(late)??)

@@ -113,8 +113,8 @@ impl SearchCourse {
         };
         let (numbers, costs) = (column("evaluation"), column("cost"));
         let moments = ["mean", "coefficient_of_variation"].map(column);
-        let known = |parameter: &Parameter| Some((*parameter, column(parameter.name())?));
-        let free: Vec<_> = finding.free_parameters().iter().filter_map(known).collect();
+        let named_column = |parameter: &Parameter| Some((*parameter, column(parameter.name())?));
+        let free: Vec<_> = finding.free_parameters().iter().filter_map(named_column).collect();
         let within = |parameter: Parameter, value: f64| {
             finding.range(parameter).coordinate(value).unwrap_or(f64::NAN)
         };

@@ -96,10 +96,10 @@ impl RealizationRows {
 
     /// Returns the realizations of a group, or all of a run without groups.
     pub(crate) fn outcomes_of_group(&self, group: Option<&str>) -> ModelOutcomes {
-        let of_group = |place: &usize| {
+        let is_of_group = |place: &usize| {
             group.is_none_or(|name| self.groups.get(*place).is_some_and(|one| one == name))
         };
-        let places: Vec<usize> = (0..self.velocities.len()).filter(of_group).collect();
+        let places: Vec<usize> = (0..self.velocities.len()).filter(is_of_group).collect();
         let failures = places.iter().enumerate().filter_map(|(index, place)| {
             let kind = self.failures.get(*place)?;
             (!kind.is_empty()).then(|| (index as f64, kind.clone()))

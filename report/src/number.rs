@@ -90,14 +90,14 @@ fn scientific(text: &str) -> String {
 }
 
 fn superscript(power: &str) -> String {
-    let raised = |c: char| match c {
+    let superscript_of = |c: char| match c {
         '-' => '⁻',
         '1' => '¹',
         '2' => '²',
         '3' => '³',
         digit => digit.to_digit(10).and_then(|d| char::from_u32(0x2070 + d)).unwrap_or(digit),
     };
-    power.chars().map(raised).collect()
+    power.chars().map(superscript_of).collect()
 }
 
 fn without_negative_zero(text: &str) -> String {

@@ -31,13 +31,13 @@ pub fn files_of(page: &str) -> Option<Vec<String>> {
     if !page.contains(GENERATOR) {
         return None;
     }
-    let plain = |name: &&str| {
+    let is_plain = |name: &&str| {
         let (stem, ending) = name.rsplit_once('.').unwrap_or_default();
         let letters = |c: char| c.is_ascii_alphanumeric() || c == '-';
         !stem.is_empty() && stem.chars().all(letters) && ["svg", "csv"].contains(&ending)
     };
     let codes = page.split("<code>").skip(1).filter_map(|rest| rest.split("</code>").next());
-    Some(codes.filter(plain).map(str::to_owned).collect())
+    Some(codes.filter(is_plain).map(str::to_owned).collect())
 }
 
 /// A report.

@@ -40,7 +40,7 @@ impl Solver {
         Self::with_isa(setup, Isa::fastest())
     }
 
-    /// Same as [`new`](Self::new), on one instruction set. The bits do not depend on it.
+    /// Creates a solver that computes on `isa`. The bits of its results do not depend on the instruction set.
     pub fn with_isa(setup: &Setup, isa: Isa) -> Self {
         let memory = Arc::new(TableMemory::default());
         let probe = &setup.probe;
@@ -134,7 +134,7 @@ impl Solver {
         }
     }
 
-    /// Same as [`arrival`](Self::arrival), reduced to the data that a job keeps.
+    /// Computes the velocity of one bone, m/s, or the kind of failure: what a job keeps of an arrival.
     pub fn outcome(&self, bone: &Bone, workspace: &mut Workspace) -> Outcome {
         self.arrival(bone, workspace)
             .map(|arrival| arrival.velocity)

@@ -40,8 +40,8 @@ fn drop_slowest(outcomes: &[Outcome], part: f64) -> Vec<Outcome> {
     let mut ascending = velocities(outcomes);
     ascending.sort_by(f64::total_cmp);
     let limit = ascending[(part * ascending.len() as f64) as usize];
-    let failed = |outcome: &Outcome| outcome.is_ok_and(|velocity| velocity < limit);
-    let cut = |outcome| if failed(outcome) { Err(FailureKind::NoArrival) } else { *outcome };
+    let is_slow = |outcome: &Outcome| outcome.is_ok_and(|velocity| velocity < limit);
+    let cut = |outcome| if is_slow(outcome) { Err(FailureKind::NoArrival) } else { *outcome };
     outcomes.iter().map(cut).collect()
 }
 

@@ -226,7 +226,7 @@ fn power_into_the_plate_is_radiated_into_the_marrow() {
         for (k, omega) in [(100.0, 2e6), (1500.0, 5e6), (4000.0, 1.1e7)] {
             let s = Complex::new(1e-9 * omega, omega);
             // No echo comes back from a face that far away.
-            let on = |density: f64| {
+            let admittance_on = |density: f64| {
                 let mut setup = Setup::default();
                 setup.layers.marrow.thickness = 1e15;
                 setup.layers.marrow.density = density;
@@ -235,9 +235,10 @@ fn power_into_the_plate_is_radiated_into_the_marrow() {
             // The marrow's load Z = ρ s²/g is imaginary and proportional to its density, and
             // |∂Y/∂Z| is |u3(-h)/p(0)|² by reciprocity: so this is |Im Z| |u3(-h)|².
             let step = 1e-4;
-            let change = on(1000.0 * (1.0 + step)) - on(1000.0 * (1.0 - step));
+            let change =
+                admittance_on(1000.0 * (1.0 + step)) - admittance_on(1000.0 * (1.0 - step));
             let radiated = change.abs() / (2.0 * step);
-            let taken = on(1000.0).im.abs();
+            let taken = admittance_on(1000.0).im.abs();
             let error = (taken - radiated).abs() / radiated;
             // The central difference is right to the square of its step over the resonance's width.
             assert!(error < 1e-5, "index {index}, k {k}, omega {omega}: {error:e}");

@@ -87,12 +87,12 @@ fn the_first_signal_of_a_thick_plate_is_the_lateral_wave() {
 fn the_lower_face_of_a_thick_plate_is_not_heard() {
     for index in 0..3 {
         let bone = orthotropic(&draw(0.1029, 31, index));
-        let of = |thickness: f64| {
+        let velocity_at = |thickness: f64| {
             velocity(&refined_setup(|setup| setup.layers.bone_thickness = thickness), &bone)
         };
         // To the lower face and back it is longer than to the end of the first packet: what
         // remains is the sampling's error at refinement 2.
-        let change = of(12e-3) / of(24e-3) - 1.0;
+        let change = velocity_at(12e-3) / velocity_at(24e-3) - 1.0;
         assert!(change.abs() < 1e-5, "index {index}: {change:e}");
     }
 }

@@ -63,14 +63,14 @@ fn measure_draws(thickness: f64, draws: &Draws) -> Result<Vec<MeasuredDraw>, Poi
 /// admissible.
 pub(crate) fn mean_model(seed: u64, index: u64) -> Point {
     let mut generator = Generator::for_index(seed, index);
-    let mut drawn = || Point::of_bone(BOUNDS.map(|(from, to)| generator.between(from, to)));
+    let mut draw = || Point::of_bone(BOUNDS.map(|(from, to)| generator.between(from, to)));
     for _ in 1..TRIES_MAX {
-        let point = drawn();
+        let point = draw();
         if point.constants().elasticity().is_ok() {
             return point;
         }
     }
-    drawn()
+    draw()
 }
 
 #[cfg(test)]

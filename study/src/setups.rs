@@ -287,10 +287,10 @@ fn setup(generator: &mut Generator, ranges: &Ranges) -> Setup {
     let center_frequency = generator.decades(ranges.center_frequency.0, ranges.center_frequency.1);
     let coupling = fluid(generator, ranges);
     let marrow = fluid(generator, ranges);
-    let mut within = |(from, to): (f64, f64)| generator.decades(from, to);
-    let bone_thickness = within((0.5e-3, 8e-3));
-    let (source, receivers) = (within(ranges.height), within(ranges.height));
-    let (first_x1, span) = (within(ranges.first_x1), within(ranges.span));
+    let mut draw = |(from, to): (f64, f64)| generator.decades(from, to);
+    let bone_thickness = draw((0.5e-3, 8e-3));
+    let (source, receivers) = (draw(ranges.height), draw(ranges.height));
+    let (first_x1, span) = (draw(ranges.first_x1), draw(ranges.span));
     let count = generator.between(3.0, 25.0) as u32;
     Setup {
         layers: Layers { coupling, bone_thickness, marrow, ..Layers::default() },
@@ -310,10 +310,10 @@ fn setup(generator: &mut Generator, ranges: &Ranges) -> Setup {
 }
 
 fn fluid(generator: &mut Generator, ranges: &Ranges) -> Fluid {
-    let mut within = |(from, to): (f64, f64)| generator.decades(from, to);
+    let mut draw = |(from, to): (f64, f64)| generator.decades(from, to);
     Fluid {
-        thickness: within(ranges.fluid_thickness),
-        density: within(ranges.fluid_density),
+        thickness: draw(ranges.fluid_thickness),
+        density: draw(ranges.fluid_density),
         sound_speed: generator.between(1000.0, 2000.0),
         attenuation: Attenuation::default(),
     }
@@ -321,10 +321,10 @@ fn fluid(generator: &mut Generator, ranges: &Ranges) -> Fluid {
 
 fn attenuate(layers: &mut Layers, generator: &mut Generator, factors: [(f64, f64); 2]) {
     let [bone, fluids] = factors;
-    let mut drawn = |(from, to)| Some(generator.decades(from, to));
-    layers.bone_attenuation.quality_factor = drawn(bone);
-    layers.coupling.attenuation.quality_factor = drawn(fluids);
-    layers.marrow.attenuation.quality_factor = drawn(fluids);
+    let mut draw = |(from, to)| Some(generator.decades(from, to));
+    layers.bone_attenuation.quality_factor = draw(bone);
+    layers.coupling.attenuation.quality_factor = draw(fluids);
+    layers.marrow.attenuation.quality_factor = draw(fluids);
 }
 
 /// Half of the means are the optimum's, made stiffer or softer; half are isotropic.

@@ -88,7 +88,7 @@ pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, 
         let mut row = vec![(set + 1).to_string(), searched.name().replace('_', " ")];
         for parameter in [searched, Parameter::Dispersion] {
             let quantity = found.as_ref().and_then(|found| quantity_of(found, parameter));
-            let (truth, quantity) = (truth.get(parameter), quantity);
+            let truth = truth.get(parameter);
             row.push(format!("{truth:.5e}"));
             row.push(quantity.map_or("–".to_owned(), |found| format!("{:.5e}", found.value)));
             row.push(two_digits(quantity.and_then(|found| errors(&found, truth))));
@@ -112,7 +112,7 @@ pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTabl
     Ok(table)
 }
 
-/// The same for bones of a population: thicknesses of 4 ± 0.5 mm and quality factors of 15 ± 2, a
+/// As [`coverage`], but for bones of a population: thicknesses of 4 ± 0.5 mm and quality factors of 15 ± 2, a
 /// coupling of 1500 ± 15 m/s, and a probe's tilt of 0 ± 0.5°. The model knows these laws, or takes the
 /// means for all bones.
 ///
@@ -162,7 +162,8 @@ struct Counts {
 }
 
 impl Counts {
-    /// Counts over data sets that are made in some surroundings, and identified by a model in others.
+    /// Counts over data sets that are made in the surroundings `data`, and identified by a model in the
+    /// surroundings `model`.
     fn count_over_data_sets(
         twins: &Twins,
         data: &Surroundings,

@@ -98,7 +98,7 @@ mod tests {
         let page = fs::read_to_string(root().join(super::PAGE)).unwrap();
         let commands = commands(&page).unwrap();
         assert!(commands.len() > 5, "{commands:?}");
-        let made = |command: &String| page.contains(&format!("\n`osteon-study {command}"));
-        assert!(commands.iter().all(made), "{commands:?}");
+        let is_made = |command: &String| page.contains(&format!("\n`osteon-study {command}"));
+        assert!(commands.iter().all(is_made), "{commands:?}");
     }
 }

@@ -108,13 +108,13 @@ fn who_may_call_what_is_a_table() {
         ("admin", Presented::Token(admin.reveal())),
     ];
     let none = [Err(Unknown), Err(Unknown), Err(Unknown)];
-    let of = |rest: [Result<(), Code>; 3]| [none, rest].concat();
+    let answers = |rest: [Result<(), Code>; 3]| [none, rest].concat();
     let table = [
         (Requirement::Nothing, vec![Ok(()); 6]),
-        (Requirement::Known, of([Ok(()); 3])),
-        (Requirement::Role(Role::Read), of([Ok(()); 3])),
-        (Requirement::Role(Role::Submit), of([Err(Weak), Ok(()), Ok(())])),
-        (Requirement::Role(Role::Admin), of([Err(Weak), Err(Weak), Ok(())])),
+        (Requirement::Known, answers([Ok(()); 3])),
+        (Requirement::Role(Role::Read), answers([Ok(()); 3])),
+        (Requirement::Role(Role::Submit), answers([Err(Weak), Ok(()), Ok(())])),
+        (Requirement::Role(Role::Admin), answers([Err(Weak), Err(Weak), Ok(())])),
     ];
     for policy in [Policy::Tokens(list.clone()), Policy::Tls(list.clone())] {
         for (need, expected) in &table {

@@ -87,9 +87,9 @@ impl Ahead {
 
     /// Takes the complete evaluations that have waited since `before` and are not in the store.
     pub(crate) fn take_unsaved(&mut self, before: Duration) -> Vec<PendingEvaluation> {
-        let old = |(_, complete): &mut (Box<PendingEvaluation>, Duration)| *complete <= before;
+        let is_old = |(_, complete): &mut (Box<PendingEvaluation>, Duration)| *complete <= before;
         let prepared = self.prepared.values_mut();
-        prepared.filter_map(|prepared| prepared.unsaved.take_if(old)).map(|it| *it.0).collect()
+        prepared.filter_map(|prepared| prepared.unsaved.take_if(is_old)).map(|it| *it.0).collect()
     }
 
     /// Returns the complete evaluations.

@@ -67,7 +67,7 @@ pub(crate) fn choose(
     answered: Indices,
     due: NextAudit,
 ) -> (Option<Indices>, NextAudit) {
-    let drawn = |what| uniform(key, [batch.0, answered.first, what]);
+    let draw = |what| uniform(key, [batch.0, answered.first, what]);
     let left = due.left - answered.count as f64;
     if left > 0.0 {
         return (None, NextAudit { left, ..due });
@@ -75,7 +75,7 @@ pub(crate) fn choose(
     let share = (fraction * answered.count as f64).ceil() as u64;
     let length = share.max(due.length).clamp(1, answered.count);
     let room = answered.count - length + 1;
-    let offset = ((drawn(0) * room as f64) as u64).min(room - 1);
+    let offset = ((draw(0) * room as f64) as u64).min(room - 1);
     let audited = Indices { first: answered.first + offset, count: length };
     if fraction >= 1.0 {
         return (Some(audited), NextAudit { left: 0.0, length });
@@ -84,7 +84,7 @@ pub(crate) fn choose(
     // the fraction is kept.
     let unplanned = (length as f64 - due.length as f64) / fraction;
     let next = share.max(least).min(answered.count);
-    let left = left + unplanned + distance(fraction, next, drawn(1));
+    let left = left + unplanned + distance(fraction, next, draw(1));
     (Some(audited), NextAudit { left, length: next })
 }
 
@@ -127,8 +127,8 @@ mod tests {
 
     /// Returns which of many batches are chosen.
     fn chosen_batches(key: &AuditKey, fraction: f64) -> Vec<u64> {
-        let of = |i: &u64| is_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
-        (0..10_000).filter(of).collect()
+        let is_audited = |i: &u64| is_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
+        (0..10_000).filter(is_audited).collect()
     }
 
     /// Returns the fraction of the realizations that is audited, and the most that a worker computes between

@@ -285,16 +285,16 @@ pub(crate) struct Speculation {
 
 /// Returns the approximate memory of a specification, bytes.
 pub(crate) fn bytes(specification: &JobSpecification) -> u64 {
-    let of_data = |data: &Data| {
+    let data_bytes = |data: &Data| {
         let names: usize =
             data.groups().iter().map(|group| size_of::<Group>() + group.name.len()).sum();
-        let of_set = |set: VelocitySet<'_>| {
+        let set_bytes = |set: VelocitySet<'_>| {
             size_of_val(set.velocities) + set.subjects.map_or(0, size_of_val)
         };
-        let sets: usize = (0..data.sets()).filter_map(|set| data.set(set)).map(of_set).sum();
+        let sets: usize = (0..data.sets()).filter_map(|set| data.set(set)).map(set_bytes).sum();
         names + sets
     };
-    let data = specification.data.as_ref().map_or(0, of_data);
+    let data = specification.data.as_ref().map_or(0, data_bytes);
     (size_of::<JobSpecification>() + data) as u64
 }
 

@@ -197,13 +197,13 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
 /// answer; empty if there are none.
 fn unfit(state: &State) -> String {
     let failing = state.lost_in_a_row.iter().filter(|(host, _)| state.is_failing(host));
-    let named = |(host, lost): (&String, &HostLosses)| {
+    let describe = |(host, lost): (&String, &HostLosses)| {
         format!("the last {} workers of {host} were lost with their batches", lost.workers.len())
     };
     // A worker that holds nothing or has departed is not waited for.
     let holding = state.workers.values().filter(|worker| !worker.in_flight.is_empty());
     let silent = holding.filter(|worker| state.probation.is_silent(&worker.name));
     let silent = silent.map(|worker| format!("{} does not answer its batches", worker.name));
-    let all = failing.map(named).take(UNFIT_SHOWN_MAX).chain(silent.take(UNFIT_SHOWN_MAX));
+    let all = failing.map(describe).take(UNFIT_SHOWN_MAX).chain(silent.take(UNFIT_SHOWN_MAX));
     all.collect::<Vec<_>>().join(", ")
 }

@@ -244,19 +244,19 @@ impl State {
     /// Returns the number of realizations in the evaluations of all active jobs, with speculative ones
     /// and those ahead of their searches.
     pub(crate) fn realizations(&self) -> u64 {
-        let of_job = |id: &JobId| {
+        let count_realizations = |id: &JobId| {
             let job = self.jobs.get(id)?;
             let each = job.record.specification.monte_carlo.realizations;
             let further = job.speculation.evaluations.len() + job.ahead.count();
             Some(each * (1 + further as u64))
         };
-        self.active.iter().filter_map(of_job).sum()
+        self.active.iter().filter_map(count_realizations).sum()
     }
 
     /// Returns the number of records on their way to the store.
     pub(crate) fn unstored_records(&self) -> usize {
-        let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
-        let banned = self.banned.iter().filter(on_its_way).count();
+        let is_on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
+        let banned = self.banned.iter().filter(is_on_its_way).count();
         let jobs =
             self.jobs.values().filter(|job| job.stage.is_storing() && job.store_retry.is_none());
         jobs.count() + banned
@@ -313,8 +313,8 @@ impl State {
 
     /// Returns the point of an assignment's realizations, while its evaluation is under way, or its proof.
     pub(crate) fn point_of(&self, assignment: &Assignment) -> Option<Point> {
-        let of_proof = || Some(self.proofs.with_attempt(assignment.attempt)?.1.point());
-        self.evaluation_of(assignment).map(|it| it.point).or_else(of_proof)
+        let proof_point = || Some(self.proofs.with_attempt(assignment.attempt)?.1.point());
+        self.evaluation_of(assignment).map(|it| it.point).or_else(proof_point)
     }
 
     /// Returns a number for the next attempt at an evaluation.
@@ -325,8 +325,8 @@ impl State {
 
     /// Returns the ban of a host that has not been lifted.
     pub(crate) fn ban(&self, host: &str) -> Option<&BanRecord> {
-        let of_host = |banned: &&Banned| banned.record.worker.host() == host;
-        let mut records = self.banned.iter().filter(of_host).map(|banned| &banned.record);
+        let is_of_host = |banned: &&Banned| banned.record.worker.host() == host;
+        let mut records = self.banned.iter().filter(is_of_host).map(|banned| &banned.record);
         records.find(|record| record.lifted.is_none())
     }
 
@@ -348,8 +348,8 @@ impl State {
 
     /// Returns the first running job with a setup.
     pub(crate) fn active_job_of(&self, setup: &SetupKey) -> Option<JobId> {
-        let of_setup = |id: &&JobId| self.jobs.get(id).is_some_and(|job| job.setup == *setup);
-        self.active.iter().find(of_setup).copied()
+        let has_setup = |id: &&JobId| self.jobs.get(id).is_some_and(|job| job.setup == *setup);
+        self.active.iter().find(has_setup).copied()
     }
 
     /// Returns whether any ban is not durable yet.

@@ -34,13 +34,13 @@ impl State {
 
     /// Returns a worker whose place in the order is not the one that it should have, if there is one.
     pub(crate) fn find_misplaced(&self) -> Option<WorkerId> {
-        let wrong = |worker: &WorkerId| self.order.place(*worker) != self.place(*worker);
-        let listed = self.order.workers().chain(self.workers.keys().copied()).find(wrong);
-        let stray = || {
-            let unknown = |place: &ServicePlace| self.order.place(place.worker) != Some(*place);
-            self.order.iter().find(unknown).map(|place| place.worker)
+        let is_misplaced = |worker: &WorkerId| self.order.place(*worker) != self.place(*worker);
+        let listed = self.order.workers().chain(self.workers.keys().copied()).find(is_misplaced);
+        let find_stray = || {
+            let is_stray = |place: &ServicePlace| self.order.place(place.worker) != Some(*place);
+            self.order.iter().find(is_stray).map(|place| place.worker)
         };
-        listed.or_else(stray)
+        listed.or_else(find_stray)
     }
 
     /// Returns the number of batches that a worker holds, without speculative ones.

@@ -15,8 +15,9 @@ use crate::core::effect::{Answer, SearchRows};
 use crate::core::event::Request;
 use crate::core::ids::JobId;
 use crate::live::json;
-use crate::live::source::{PageSource, unexpected_status};
+use crate::live::source::PageSource;
 use crate::service::fetching;
+use crate::service::no_answer::unexpected_status;
 use crate::store::job_output::ReadRequest;
 
 /// Maximum number of rows that are read at a time: what the core copies for one update.
@@ -122,7 +123,7 @@ impl FollowedSearch {
     fn add(&mut self, specification: Arc<JobSpecification>, rows: &[Evaluation]) -> bool {
         let mut is_new = self.seen.is_none();
         self.is_stale |= is_new || !rows.is_empty();
-        let begun = |specification: Arc<JobSpecification>, set: usize| SeenRows {
+        let begin = |specification: Arc<JobSpecification>, set: usize| SeenRows {
             course: SearchCourse::for_job(&specification, set),
             specification,
             set,
@@ -131,12 +132,12 @@ impl FollowedSearch {
             failures: FailureCounts::default(),
         };
         let first = self.wanted.unwrap_or(0);
-        let seen = self.seen.get_or_insert_with(|| begun(specification, first));
+        let seen = self.seen.get_or_insert_with(|| begin(specification, first));
         for row in rows {
             let set = row.role.group as usize;
             if set != seen.set && self.wanted.is_none() {
                 let count = seen.count;
-                *seen = SeenRows { count, ..begun(Arc::clone(&seen.specification), set) };
+                *seen = SeenRows { count, ..begin(Arc::clone(&seen.specification), set) };
                 is_new = true;
             }
             if set == seen.set {

@@ -155,7 +155,7 @@ pub(crate) fn workers(listed: &ListWorkersResponse) -> Value {
             "not_ok": load.unwell,
         })
     };
-    let departed = |gone: &DepartedWorker| {
+    let departed_worker = |gone: &DepartedWorker| {
         json!({
             "host": gone.host,
             "process": gone.process,
@@ -169,7 +169,7 @@ pub(crate) fn workers(listed: &ListWorkersResponse) -> Value {
         "realizations_per_second": rate,
         "hosts": largest.iter().take(HOSTS_MAX).map(host).collect::<Vec<_>>(),
         "more_hosts": count.saturating_sub(HOSTS_MAX),
-        "departed": listed.departed.iter().take(DEPARTED_MAX).map(departed).collect::<Vec<_>>(),
+        "departed": listed.departed.iter().take(DEPARTED_MAX).map(departed_worker).collect::<Vec<_>>(),
     })
 }
 

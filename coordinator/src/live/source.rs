@@ -24,6 +24,7 @@ use crate::metrics::write_times::WriteTimes;
 use crate::service::core_task::Message;
 use crate::service::jobs::JobsService;
 use crate::service::meter::CoreReport;
+use crate::service::no_answer::{stopped_status, unexpected_status};
 use crate::store::thread::StoreCommand;
 
 /// Maximum number of pages that are kept up to date at a time.
@@ -151,15 +152,7 @@ impl PageSource {
 }
 
 async fn answer_in_time<T>(answer: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
-    let late = || Status::unavailable("the coordinator does not answer; its log may say why");
-    timeout(CORE_TIMEOUT, answer).await.map_err(|_| late())?
-}
-
-fn stopped_status() -> Status {
-    Status::unavailable("the coordinator has stopped; try again when it is back")
-}
-
-/// The core gave an answer of another type than requested.
-pub(crate) fn unexpected_status() -> Status {
-    Status::internal("the coordinator gave an answer of another type than requested")
+    let late_status =
+        || Status::unavailable("the coordinator does not answer; its log may say why");
+    timeout(CORE_TIMEOUT, answer).await.map_err(|_| late_status())?
 }

@@ -240,7 +240,7 @@ fn coordinator_families(scrape: &Scrape) -> Vec<MetricFamily> {
 /// The process, by the names that are usual for every program.
 fn process_families(scrape: &Scrape) -> Vec<MetricFamily> {
     let ProcessUsage { cpu_s, resident_bytes, open_files, open_files_max } = scrape.process;
-    let known = |name, help, value: Option<u64>| Some(gauge(name, help, value? as f64));
+    let known_gauge = |name, help, value: Option<u64>| Some(gauge(name, help, value? as f64));
     let cpu = MetricFamily {
         name: "process_cpu_seconds",
         help: "Processor time of the process",
@@ -251,9 +251,11 @@ fn process_families(scrape: &Scrape) -> Vec<MetricFamily> {
         "Start of the coordinator in seconds since the Unix epoch",
         scrape.started_s,
     );
-    let memory = known("process_resident_memory_bytes", "Memory of the process", resident_bytes);
-    let files = known("process_open_fds", "Open files and connections", open_files);
-    let most = known("process_max_fds", "Limit of open files and connections", open_files_max);
+    let memory =
+        known_gauge("process_resident_memory_bytes", "Memory of the process", resident_bytes);
+    let files = known_gauge("process_open_fds", "Open files and connections", open_files);
+    let most =
+        known_gauge("process_max_fds", "Limit of open files and connections", open_files_max);
     [Some(cpu), Some(started), memory, files, most].into_iter().flatten().collect()
 }
 

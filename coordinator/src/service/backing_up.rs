@@ -13,6 +13,7 @@ use tokio::time::{Instant, sleep, timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
+use crate::service::no_answer::stopped_status;
 use crate::store::StoreError;
 
 /// Number of messages that are prepared before they are read.
@@ -69,7 +70,7 @@ struct PartSender {
 }
 
 impl PartSender {
-    async fn part(&self, part: Part) -> Result<(), Unsent> {
+    async fn send(&self, part: Part) -> Result<(), Unsent> {
         let left = self.until.saturating_duration_since(Instant::now());
         let patience = Duration::from_secs(READER_STALL_SECONDS_MAX).min(left);
         let message = Ok(BackupResponse { part: Some(part) });
@@ -101,10 +102,10 @@ async fn send(copied: oneshot::Receiver<Copied>, outgoing: &PartSender) -> Resul
         }
         digest.update(&data);
         length += data.len() as u64;
-        outgoing.part(Part::Data(data)).await?;
+        outgoing.send(Part::Data(data)).await?;
     }
     let digest = digest.finalize().to_hex().to_string();
-    outgoing.part(Part::End(BackupEnd { length, digest })).await?;
+    outgoing.send(Part::End(BackupEnd { length, digest })).await?;
     Ok(length)
 }
 
@@ -114,16 +115,14 @@ async fn wait_for_copy(
     outgoing: &PartSender,
 ) -> Result<File, Unsent> {
     loop {
-        outgoing.part(Part::Data(Vec::new())).await?;
+        outgoing.send(Part::Data(Vec::new())).await?;
         tokio::select! {
             copied = &mut copied => {
                 return match copied {
                     Ok(Ok(Some(file))) => Ok(file),
                     Ok(Err(error)) => Err(Unsent::Refused(refusal_status(&error))),
                     // The store's thread ends with the coordinator.
-                    Ok(Ok(None)) | Err(_) => Err(Unsent::Refused(Status::unavailable(
-                        "the coordinator has stopped; try again when it is back",
-                    ))),
+                    Ok(Ok(None)) | Err(_) => Err(Unsent::Refused(stopped_status())),
                 };
             }
             () = outgoing.sender.closed() => return Err(Unsent::Gone),

@@ -354,10 +354,10 @@ impl Core {
                 Ok(sender.subscribe())
             }
         };
-        let ended = |receiver: &watch::Receiver<v1::JobSnapshot>| {
+        let has_ended = |receiver: &watch::Receiver<v1::JobSnapshot>| {
             receiver.borrow().state() == v1::JobState::Ended
         };
-        if answer.as_ref().is_ok_and(ended) {
+        if answer.as_ref().is_ok_and(has_ended) {
             self.watching.remove(&job);
         }
         // The client may have gone.

@@ -75,8 +75,8 @@ impl FailureReporter {
     pub(crate) fn first(&self) -> impl Future<Output = ComponentFailure> + Send + use<> {
         let mut health = self.0.subscribe();
         async move {
-            let failed = |health: &Health| matches!(health, Health::Failed(_));
-            if let Ok(known) = health.wait_for(failed).await
+            let is_failed = |health: &Health| matches!(health, Health::Failed(_));
+            if let Ok(known) = health.wait_for(is_failed).await
                 && let Health::Failed(failed) = &*known
             {
                 return failed.clone();

@@ -1,5 +1,5 @@
-//! Sends the output of an ended job: to a few clients at a time, only as fast as they read, and
-//! while it is being read from the store.
+//! Sends the output of an ended job to a few clients at a time: only as fast as they read it, and while
+//! it is still being read from the store.
 
 use std::pin::pin;
 use std::sync::Arc;
@@ -21,6 +21,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
 use crate::core::ids::JobId;
+use crate::service::no_answer::stopped_status;
 use crate::store::EndRecord;
 use crate::store::job_output::{OutputError, ReadRequest, Reply, StoredOutput};
 use crate::store::thread::StoreCommand;
@@ -61,10 +62,6 @@ async fn outcomes(
     read(store, |reply| ReadRequest::Outcomes(job, number, reply)).await.map(Some)
 }
 
-fn stopped_status() -> Status {
-    Status::unavailable("the coordinator has stopped; try again when it is back")
-}
-
 /// Reads the output of an ended job except its outcomes.
 async fn read_output(
     store: &mpsc::WeakSender<StoreCommand>,
@@ -76,40 +73,40 @@ async fn read_output(
     Ok(StoredOutput { end, specification: record.specification, summary })
 }
 
-/// Sends one specification, one result, history blocks, realization blocks and draw blocks; where
-/// the data are groups, also the result with realization and draw blocks of each. The parts are read and made while
-/// they are sent; computations run on a thread of their own.
+/// Sends one specification, one result, then blocks of history, realizations and draws; if the data are
+/// groups, also the result of each with its blocks of realizations and draws. Parts are read and made
+/// while those before them are sent; computations run on a thread of their own.
 pub(crate) async fn send_all(
     store: mpsc::WeakSender<StoreCommand>,
     (end, integrity): (EndRecord, Option<Integrity>),
     reader: FetchStream,
 ) -> Result<(), StreamEnd> {
     let job = end.job;
-    let left = Arc::new(reader.wait_with_heartbeats(read_output(&store, end)).await?);
-    reader.send(Part::Specification(specification::to_message(&left.specification))).await?;
-    let of_best = reader.wait_with_heartbeats(outcomes(&store, job, left.best())).await?;
-    let (message, samples) = compute_on_thread(&left, &reader, move |left| {
-        let result = JobResult { integrity, ..left.result(of_best) };
+    let output = Arc::new(reader.wait_with_heartbeats(read_output(&store, end)).await?);
+    reader.send(Part::Specification(specification::to_message(&output.specification))).await?;
+    let best_outcomes = reader.wait_with_heartbeats(outcomes(&store, job, output.best())).await?;
+    let (message, samples) = compute_on_thread(&output, &reader, move |output| {
+        let result = JobResult { integrity, ..output.result(best_outcomes) };
         let message = v1::JobResult {
             status: JOB_STATUS.number(result.status),
             reason: result.reason.clone(),
-            json: ResultFile::from_job(left.specification.kind, &result).to_json(),
+            json: ResultFile::from_job(output.specification.kind, &result).to_json(),
         };
         (message, SetSamples::new(result.best, result.conclusions))
     })
     .await?;
     reader.send(Part::Result(message)).await?;
-    for rows in left.summary.history.chunks(HISTORY_BLOCK_ROWS) {
+    for rows in output.summary.history.chunks(HISTORY_BLOCK_ROWS) {
         let rows = rows.iter().map(history::evaluation_to_message).collect();
         reader.send(Part::History(HistoryBlock { rows, groups: Vec::new() })).await?;
     }
     send_samples(None, &samples, &reader).await?;
-    for set in 0..left.groups() {
-        let read = reader.wait_with_heartbeats(outcomes(&store, job, left.best_of(set))).await?;
+    for set in 0..output.groups() {
+        let read = reader.wait_with_heartbeats(outcomes(&store, job, output.best_of(set))).await?;
         let number = u32::try_from(set).unwrap_or(u32::MAX);
-        let found = compute_on_thread(&left, &reader, move |left| {
-            let found = left.group(set, read)?;
-            let json = Group::new(left.specification.objective, &found).to_json();
+        let found = compute_on_thread(&output, &reader, move |output| {
+            let found = output.group(set, read)?;
+            let json = Group::new(output.specification.objective, &found).to_json();
             let message = v1::GroupResult { group: number, json };
             Some((message, SetSamples::new(found.best, found.conclusions)))
         });
@@ -124,14 +121,14 @@ pub(crate) async fn send_all(
 /// so it holds the permit of its fetch until it ends: clients that disconnect and come back cannot
 /// start more of these threads than there are permits.
 async fn compute_on_thread<T: Send + 'static>(
-    left: &Arc<StoredOutput>,
+    output: &Arc<StoredOutput>,
     reader: &FetchStream,
     compute: impl FnOnce(&StoredOutput) -> T + Send + 'static,
 ) -> Result<T, StreamEnd> {
-    let (left, permit) = (Arc::clone(left), Arc::clone(&reader.permit));
+    let (output, permit) = (Arc::clone(output), Arc::clone(&reader.permit));
     let computing = spawn_blocking(move || {
         let _place = permit;
-        compute(&left)
+        compute(&output)
     });
     let failed = |_| Status::internal("the result could not be computed; see the log");
     reader.wait_with_heartbeats(async { computing.await.map_err(failed) }).await
@@ -155,11 +152,11 @@ async fn send_samples(
     Ok(())
 }
 
-/// The reading end of a fetch.
+/// The stream of a fetch to its reader.
 pub(crate) struct FetchStream {
     parts: mpsc::Sender<Result<FetchResponse, Status>>,
     until: Instant,
-    /// Its concurrency permit.
+    /// Counts as one of the fetches that are allowed at a time.
     permit: Arc<dyn Send + Sync>,
 }
 
@@ -229,7 +226,7 @@ where
     let until = Instant::now() + Duration::from_secs(FETCH_SECONDS_MAX);
     let producing = produce(FetchStream { parts, until, permit: Arc::new(permit) });
     tokio::spawn(async move {
-        // The reader's permit is released with it.
+        // The permit is released when this ends.
         let stopped = producing.await;
         if let Err(StreamEnd::Told(status)) = stopped {
             // The reader may have gone by now.

@@ -35,6 +35,7 @@ use crate::access::limiter::{Caller, Limiter};
 use crate::core::event::{self, Retention};
 use crate::core::ids::{JobId, WorkerId};
 use crate::service::fetching;
+use crate::service::no_answer::{stopped_status, unexpected_status};
 use crate::service::observers;
 use crate::store::thread::StoreCommand;
 use crate::store::{BanRecord, EndRecord};
@@ -394,14 +395,6 @@ fn refusal_status(refusal: &Refusal) -> Status {
         | Refusal::NotPruned { .. }
         | Refusal::NotReopened { .. } => Status::unavailable(message),
     }
-}
-
-fn stopped_status() -> Status {
-    Status::unavailable("the coordinator has stopped; try again when it is back")
-}
-
-fn unexpected_status() -> Status {
-    Status::internal("the coordinator gave an answer of another type than requested")
 }
 
 #[cfg(test)]

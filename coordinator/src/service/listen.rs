@@ -151,17 +151,8 @@ impl Listener {
             Some(host) if local.ip().is_unspecified() => format!("https://{host}:{}", local.port()),
             _ => format!("https://{local}"),
         };
-        let (bound, policy) = (BoundSocket::Tcp(listener), Policy::Tls(tokens));
-        Ok(Self {
-            bound,
-            file: None,
-            tls: Some(tls),
-            policy,
-            metrics: None,
-            page: None,
-            spans: None,
-            url,
-        })
+        let open = Self::for_everybody(BoundSocket::Tcp(listener), None, url);
+        Ok(Self { tls: Some(tls), policy: Policy::Tls(tokens), ..open })
     }
 
     /// Admits only holders of tokens.

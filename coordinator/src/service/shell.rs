@@ -330,15 +330,15 @@ async fn services(
     let (health, health_service) = tonic_health::server::health_reporter();
     health.set_serving::<JobsServer<JobsService>>().await;
     health.set_serving::<WorkersServer<WorkersService>>().await;
-    let described = || {
+    let describe = || {
         tonic_reflection::server::Builder::configure()
             .register_encoded_file_descriptor_set(v1::FILE_DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
     let unreadable = |source| StartError::Reflection { source };
-    let reflection = described().build_v1().map_err(unreadable)?;
+    let reflection = describe().build_v1().map_err(unreadable)?;
     // The official clients of some languages support only this version.
-    let reflection_v1alpha = described().build_v1alpha().map_err(unreadable)?;
+    let reflection_v1alpha = describe().build_v1alpha().map_err(unreadable)?;
     Ok(Server::builder()
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE))

@@ -180,14 +180,14 @@ fn axis_ticks(axis: &Axis, scale: &AxisScale, count: usize) -> Vec<Tick> {
 fn plot_data(frame: &Frame) -> String {
     let [left, top, width, height] =
         [frame.left, frame.top, frame.width, frame.height].map(coordinate);
-    let of = |scale: &AxisScale| {
+    let describe_scale = |scale: &AxisScale| {
         let spacing = match scale.spacing {
             super::Spacing::Linear => "linear",
             super::Spacing::Logarithmic => "log",
         };
         format!("{spacing} {:e} {:e}", scale.low, scale.high)
     };
-    let (x, y) = (of(&frame.x), of(&frame.y));
+    let (x, y) = (describe_scale(&frame.x), describe_scale(&frame.y));
     format!("data-plot=\"{left} {top} {width} {height}\" data-x=\"{x}\" data-y=\"{y}\"")
 }
 
@@ -312,8 +312,8 @@ fn rectangles(out: &mut String, class: &str, all: &[[f64; 4]], frame: &Frame) ->
 fn pieces(points: &[[f64; 2]], frame: &Frame) -> Vec<String> {
     let placed: Vec<Option<String>> = points.iter().map(|&[x, y]| frame.point(x, y)).collect();
     let parts = placed.split(Option::is_none);
-    let joined = |part: &[Option<String>]| part.iter().flatten().cloned().collect::<Vec<_>>();
-    parts.map(joined).filter(|part| !part.is_empty()).map(|part| part.join(" ")).collect()
+    let join = |part: &[Option<String>]| part.iter().flatten().cloned().collect::<Vec<_>>();
+    parts.map(join).filter(|part| !part.is_empty()).map(|part| part.join(" ")).collect()
 }
 
 /// Draws a point: each colour has a form of its own.

@@ -31,10 +31,10 @@ fn record(
     let places: Vec<f64> = result.receivers.iter().map(|one| one.x1 / LENGTH.size).collect();
     let pitch = places.windows(2).map(|two| (two[1] - two[0]).abs()).fold(f64::INFINITY, f64::min);
     let pitch = if pitch.is_finite() { pitch } else { 1.0 };
-    let picked = || result.receivers.iter().filter_map(|one| one.time);
+    let picked_times = || result.receivers.iter().filter_map(|one| one.time);
     // The guided waves that follow are far larger than the first packet.
     let period = 1.0 / context.case.setup.probe.center_frequency;
-    let (first, last) = picked()
+    let (first, last) = picked_times()
         .fold((f64::INFINITY, 0.0_f64), |(first, last), time| (first.min(time), last.max(time)));
     let shown = if first <= last {
         [(first - 2.0 * period).max(0.0), last + 1.5 * period]
@@ -119,13 +119,14 @@ fn line(result: &Simulation) -> Option<Figure> {
     let spread: f64 = points.iter().map(|point| (point[0] - x) * (point[0] - x)).sum();
     let both: f64 = points.iter().map(|point| (point[0] - x) * (point[1] - t)).sum();
     let slope = both / spread;
-    let fitted = |place: f64| t + slope * (place - x);
+    let line_time = |place: f64| t + slope * (place - x);
     let axis = Axis::linear(LENGTH.axis_label("receiver’s x₁"));
     let y = Axis::linear(TIME.axis_label("picked time"));
     let mut chart = Chart::new("times", "Picked times and the fitted line", axis, y);
-    let ends = [points[0][0], points[points.len() - 1][0]].map(|place| [place, fitted(place)]);
+    let ends = [points[0][0], points[points.len() - 1][0]].map(|place| [place, line_time(place)]);
     chart.layer("least-squares line", Ink::First, Shape::Line(ends.to_vec()));
-    let off = points.iter().map(|[place, time]| (time - fitted(*place)).abs()).fold(0.0, f64::max);
+    let off =
+        points.iter().map(|[place, time]| (time - line_time(*place)).abs()).fold(0.0, f64::max);
     chart.description = format!("{} picked times.", points.len());
     chart.layer("picked time", Ink::Second, Shape::Points(points));
     let velocity = result.velocity.map_or_else(String::new, |velocity| {

@@ -45,8 +45,8 @@ fn simulations_table(velocities: &[(String, Option<f64>)]) -> String {
         .iter()
         .map(|(name, velocity)| {
             let velocity = velocity.unwrap_or(f64::NAN);
-            let shown = |value| VELOCITY.show(value, crate::quantity::Precision::Digits(7));
-            vec![escape(name), shown(velocity), shown(velocity - first)]
+            let show = |value| VELOCITY.show(value, crate::quantity::Precision::Digits(7));
+            vec![escape(name), show(velocity), show(velocity - first)]
         })
         .collect();
     let columns = ["Run", "Velocity (m/s)", "Minus that of the first (m/s)"];

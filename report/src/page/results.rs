@@ -88,7 +88,7 @@ fn moments_table(numbers: &Numbers, finding: &Finding<'_>) -> Option<String> {
         return Some(table(name, &columns, &rows));
     }
     let identified = finding.identified?;
-    let of = |heading: String, one: &QuantityEstimate, at: &str, unit| {
+    let row = |heading: String, one: &QuantityEstimate, at: &str, unit| {
         let place = format!("{}/identified/{at}", finding.place);
         let known = one.ends().is_some();
         let precision = one.ends().map_or(Precision::Free, width_precision);
@@ -107,17 +107,17 @@ fn moments_table(numbers: &Numbers, finding: &Finding<'_>) -> Option<String> {
         ]
     };
     let rows = [
-        of(bulk, &identified.bulk_velocity, "bulk_velocity", VELOCITY),
-        of(dispersion, &identified.dispersion, "dispersion", NUMBER),
+        row(bulk, &identified.bulk_velocity, "bulk_velocity", VELOCITY),
+        row(dispersion, &identified.dispersion, "dispersion", NUMBER),
     ];
     Some(table(name, &columns, &rows))
 }
 
 fn parameters(numbers: &Numbers, finding: &Finding<'_>) -> String {
-    let given = |parameter: &Parameter| finding.value(*parameter).0.is_some();
+    let has_value = |parameter: &Parameter| finding.value(*parameter).0.is_some();
     let rows: Vec<Vec<String>> = Parameter::ALL
         .into_iter()
-        .filter(given)
+        .filter(has_value)
         .map(|parameter| parameter_row(numbers, finding, parameter))
         .collect();
     if rows.is_empty() {

@@ -87,18 +87,19 @@ fn group_doubts(findings: &[Finding<'_>]) -> String {
 }
 
 fn summary_and_items(verdicts: &[Verdict]) -> String {
-    let of = |bearing| verdicts.iter().filter(|one| one.bearing == bearing).collect::<Vec<_>>();
-    let (bad, caution) = (of(Bearing::Bad), of(Bearing::Caution));
-    let named = |some: &[&Verdict]| {
+    let with_bearing =
+        |bearing| verdicts.iter().filter(|one| one.bearing == bearing).collect::<Vec<_>>();
+    let (bad, caution) = (with_bearing(Bearing::Bad), with_bearing(Bearing::Caution));
+    let subjects = |some: &[&Verdict]| {
         let subjects = some.iter().map(|one| one.subject.to_lowercase());
         subjects.collect::<Vec<_>>().join(", ")
     };
     let sentence = match (bad.is_empty(), caution.is_empty()) {
         (true, true) => "Nothing found here speaks against this result.".to_owned(),
         (true, false) => {
-            format!("This result can be used with care; look first at: {}.", named(&caution))
+            format!("This result can be used with care; look first at: {}.", subjects(&caution))
         }
-        _ => format!("Do not use this result without looking at: {}.", named(&bad)),
+        _ => format!("Do not use this result without looking at: {}.", subjects(&bad)),
     };
     format!("<p class=\"trust\">{}</p>{}", escape(&sentence), items(verdicts))
 }

@@ -56,7 +56,7 @@ impl Scope {
     /// Returns the longest time, s, that a wave can spend across layers and still arrive in a
     /// window.
     pub(super) fn longest_time_across(&self) -> f64 {
-        let spent = |span: &Span| span.to - span.distance / self.speed;
-        self.windows.iter().map(spent).fold(0.0, f64::max)
+        let time_across = |span: &Span| span.to - span.distance / self.speed;
+        self.windows.iter().map(time_across).fold(0.0, f64::max)
     }
 }

@@ -54,20 +54,20 @@ fn change_data(
     generator: &mut Generator,
 ) -> Data {
     let mean = velocities.iter().sum::<f64>() / velocities.len() as f64;
-    let of = |change: &mut dyn FnMut(f64) -> f64| {
+    let change_all = |change: &mut dyn FnMut(f64) -> f64| {
         Data::from_velocities(velocities.iter().map(|&velocity| change(velocity)).collect())
     };
     match study.scenario {
         Scenario::Independent => Data::from_velocities(velocities),
         Scenario::Subjects => in_series(&velocities, subjects.min(velocities.len()), generator),
-        Scenario::Rounded => of(&mut |velocity| (velocity / STEP).round() * STEP),
-        Scenario::Outliers => of(&mut |velocity| match generator.uniform() / OUTLIERS {
+        Scenario::Rounded => change_all(&mut |velocity| (velocity / STEP).round() * STEP),
+        Scenario::Outliers => change_all(&mut |velocity| match generator.uniform() / OUTLIERS {
             below if below < 0.5 => 0.5 * velocity,
             below if below < 1.0 => 2.0 * velocity,
             _ => velocity,
         }),
         Scenario::HeavyTails => {
-            of(&mut |velocity| mean + student_scale(generator) * (velocity - mean))
+            change_all(&mut |velocity| mean + student_scale(generator) * (velocity - mean))
         }
     }
 }

@@ -159,11 +159,11 @@ fn standard_errors(values: &[(f64, f64)], number: u64) -> [f64; 4] {
     let mut sums = [[0.0; 2]; 4];
     for resampling in 0..RESAMPLINGS {
         let mut generator = Generator::for_index(number, resampling);
-        let mut drawn = || {
+        let mut draw = || {
             let place = generator.between(0.0, values.len() as f64) as usize;
             values[place.min(values.len() - 1)]
         };
-        let found = exact((0..values.len()).map(|_| drawn()).collect());
+        let found = exact((0..values.len()).map(|_| draw()).collect());
         for (sums, value) in sums.iter_mut().zip(found) {
             *sums = [sums[0] + value, sums[1] + value * value];
         }

@@ -438,20 +438,20 @@ fn malformed(defect: Malformed) -> Effect {
 
 #[test]
 fn a_batch_of_an_unknown_evaluation_ends_the_worker() {
-    let of = |evaluation| {
+    let batch_of = |evaluation| {
         Response::Batch(v1::Batch { batch: 1, evaluation, count: 1, ..v1::Batch::default() })
     };
-    let unknown = |evaluation| [malformed(Malformed::UnknownEvaluation { evaluation })];
+    let unknown_evaluation = |evaluation| [malformed(Malformed::UnknownEvaluation { evaluation })];
     let mut worker = Recorder::attached();
-    worker.message(of(7));
-    worker.expect(&unknown(7));
+    worker.message(batch_of(7));
+    worker.expect(&unknown_evaluation(7));
 
     // Each stream has its own evaluations.
     let mut worker = Recorder::attached();
     worker.event(Event::Lost);
     worker.greet();
-    worker.message(of(EVALUATION));
-    worker.expect(&unknown(EVALUATION));
+    worker.message(batch_of(EVALUATION));
+    worker.expect(&unknown_evaluation(EVALUATION));
 
     // The oldest is forgotten, but not what a worker computes of it.
     let mut worker = Recorder::attached();
@@ -460,8 +460,8 @@ fn a_batch_of_an_unknown_evaluation_ends_the_worker() {
     (100..100 + EVALUATIONS_KEPT_MAX as u64).for_each(|id| worker.evaluation(id));
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.message(of(EVALUATION));
-    worker.expect(&unknown(EVALUATION));
+    worker.message(batch_of(EVALUATION));
+    worker.expect(&unknown_evaluation(EVALUATION));
 }
 
 #[test]

@@ -75,10 +75,10 @@ pub(crate) fn settle(turn: &mut Turn, id: JobId, attempt: u64) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    let of_attempt = |it: &&mut FollowedBranch| {
+    let has_attempt = |it: &&mut FollowedBranch| {
         it.evaluation.as_ref().is_some_and(|evaluation| evaluation.attempt == attempt)
     };
-    let Some(part) = job.ahead.branches.iter_mut().find(of_attempt).map(|it| it.part) else {
+    let Some(part) = job.ahead.branches.iter_mut().find(has_attempt).map(|it| it.part) else {
         return;
     };
     if job.ahead.pass_to_branch(part, turn.now) {

@@ -42,10 +42,10 @@ fn audit_for(
     worker: WorkerId,
     name: &WorkerName,
 ) -> Option<(Audit, u64)> {
-    let of_others = |audit: &Audit| audit.by.host() != name.host();
+    let is_of_other_host = |audit: &Audit| audit.by.host() != name.host();
     let (attempt, at, audited) =
         state.jobs.get(&job)?.certain_evaluations().find_map(|evaluation| {
-            let at = evaluation.audits.iter().position(of_others)?;
+            let at = evaluation.audits.iter().position(is_of_other_host)?;
             Some((evaluation.attempt, at, evaluation.audits.get(at)?.indices.count))
         })?;
     let most = if schedule::next_job(state).is_some() {
@@ -78,12 +78,12 @@ fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
         let asked = dispute.tie_breakers.iter().filter_map(|id| state.batches.get(id));
         let asked: Vec<&str> =
             asked.filter_map(|batch| Some(state.workers.get(&batch.worker)?.name.host())).collect();
-        let may = |worker: &&AttachedWorker| {
+        let may_vote = |worker: &&AttachedWorker| {
             let host = worker.name.host();
             !worker.draining && !dispute.has_vote_of(host) && !asked.contains(&host)
         };
-        let best = state.workers.values().filter(may).map(reputation).min();
-        votes::are_lacking(state, dispute) && may(&worker) && best == Some(reputation(worker))
+        let best = state.workers.values().filter(may_vote).map(reputation).min();
+        votes::are_lacking(state, dispute) && may_vote(&worker) && best == Some(reputation(worker))
     };
     evaluation.disputes.iter().position(is_for)
 }

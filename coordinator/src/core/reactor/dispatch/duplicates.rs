@@ -14,11 +14,11 @@ use crate::core::state::State;
 /// been out longest.
 pub(crate) fn duplicate_late_batches(turn: &mut Turn) {
     let now = turn.now;
-    let late = |state: &State, batch: &Batch| {
+    let is_late = |state: &State, batch: &Batch| {
         now.saturating_sub(batch.sent) >= LATE_FACTOR * eta::expected_time(state, batch)
     };
     let idle = |place: &ServicePlace| place.held == 0;
-    duplicate(turn, idle, late);
+    duplicate(turn, idle, is_late);
 }
 
 /// Sends each worker that holds nothing a duplicate of the batch that has been out longest.
@@ -35,10 +35,10 @@ fn duplicate(
     worth: impl Fn(&State, &Batch) -> bool,
 ) {
     let patience = turn.state.config.batch_target / 2 + LATE_FACTOR * turn.state.delay.mean();
-    let old = |batch: &Batch, now: Duration| now.saturating_sub(batch.sent) >= patience;
+    let is_old = |batch: &Batch, now: Duration| now.saturating_sub(batch.sent) >= patience;
     loop {
         let (state, now) = (&*turn.state, turn.now);
-        if !open_batches(state).next().is_some_and(|(_, oldest)| old(oldest, now)) {
+        if !open_batches(state).next().is_some_and(|(_, oldest)| is_old(oldest, now)) {
             return;
         }
         // The worker that holds least comes first, and its duplicate makes it busy.
@@ -53,7 +53,7 @@ fn duplicate(
         // This walks over all batches, so it is done only when a worker is idle. A batch with duplicates
         // is out at workers that may be silent; only one that surely answers gets a further copy.
         let is_worth = |(_, batch): &(BatchId, &Batch)| {
-            old(batch, now) && worth(state, batch) && (is_sound || batch.duplicates.is_empty())
+            is_old(batch, now) && worth(state, batch) && (is_sound || batch.duplicates.is_empty())
         };
         let Some((slowest, _)) = open_batches(state).find(is_worth) else {
             return;

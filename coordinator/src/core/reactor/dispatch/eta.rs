@@ -25,12 +25,12 @@ pub(crate) fn etas(state: &State) -> BTreeMap<JobId, Duration> {
 fn batch_eta(state: &State, batch: &Batch) -> Option<Duration> {
     let worker = state.workers.get(&batch.worker)?;
     // Two batches of more than half a worker's slots each are computed one after the other.
-    let large = |held: &Batch| 2 * held.assignment.indices.count > worker.hello.slots.into();
-    if !large(batch) {
+    let is_large = |held: &Batch| 2 * held.assignment.indices.count > worker.hello.slots.into();
+    if !is_large(batch) {
         return Some(batch.sent + expected_time(state, batch));
     }
     let held = worker.in_flight.iter().filter_map(|id| state.batches.get(id));
-    let before = held.filter(|held| held.sent < batch.sent && large(held));
+    let before = held.filter(|held| held.sent < batch.sent && is_large(held));
     let waits: Duration = before.map(|held| expected_time(state, held)).sum();
     Some(batch.sent.max(worker.answered) + waits + expected_time(state, batch))
 }

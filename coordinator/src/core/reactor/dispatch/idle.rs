@@ -73,7 +73,7 @@ fn batches_out_max(state: &State, id: JobId, worker: WorkerId, size: u64) -> usi
 /// ask for as soon as a record is durable come first, the others by their rank among the candidates of
 /// their job. Points of equal rank come in the order in which their jobs are served with other work.
 fn choose_point(state: &State) -> Option<(JobId, Point)> {
-    let of_job = |id: &JobId| {
+    let rank_job = |id: &JobId| {
         let job = state.jobs.get(id)?;
         let has_room = || {
             let more = job.record.specification.monte_carlo.realizations;
@@ -89,7 +89,7 @@ fn choose_point(state: &State) -> Option<(JobId, Point)> {
         let had = state.shares.computing_time(&job.record.client);
         Some((!certain, place, had, Reverse(job.record.priority), *id))
     };
-    let (_, place, .., id) = state.active.iter().filter_map(of_job).min()?;
+    let (_, place, .., id) = state.active.iter().filter_map(rank_job).min()?;
     let point = state.jobs.get(&id)?.speculation.candidates.get(place)?;
     Some((id, *point))
 }
@@ -114,8 +114,8 @@ fn must_stay_idle(
     let begun = spare.min(queued_realizations(job, point)) as f64;
     let seconds = attached.rates.get(&id).map_or(0.0, |rate| begun / rate);
     let takes = fairness::slot_time(seconds, 1);
-    let soon = |eta: &Duration| now < *eta + takes / 2 && *eta < now + takes / 2;
-    etas.get(&id).is_some_and(soon)
+    let is_soon = |eta: &Duration| now < *eta + takes / 2 && *eta < now + takes / 2;
+    etas.get(&id).is_some_and(is_soon)
         || slots < spare + slots_wanted_by_others(state, id, now + takes, etas)
 }
 
@@ -128,7 +128,7 @@ fn queued_realizations(job: &Job, point: &Point) -> u64 {
 /// Returns the number of slots that jobs other than `but` will need before `until`, beyond those
 /// they have.
 fn slots_wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> u64 {
-    let wanted = |id: &JobId| {
+    let slots_wanted = |id: &JobId| {
         let job = state.jobs.get(id)?;
         let specification = &job.record.specification;
         let realizations = specification.monte_carlo.realizations;
@@ -150,7 +150,7 @@ fn slots_wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Eta
             Stage::StoringSubmission | Stage::Waiting | Stage::StoringEnd(_) => None,
         }
     };
-    state.active.iter().filter(|id| **id != but).filter_map(wanted).sum()
+    state.active.iter().filter(|id| **id != but).filter_map(slots_wanted).sum()
 }
 
 /// Returns whether every batch of the point that a job asks for next, when its record is durable,

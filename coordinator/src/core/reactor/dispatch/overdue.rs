@@ -71,15 +71,15 @@ pub(crate) fn is_waited_for(state: &State, id: BatchId, now: Duration) -> bool {
 /// job is unknown.
 fn expected_time(state: &State, id: BatchId) -> Option<Duration> {
     let worker = state.workers.get(&state.batches.get(&id)?.worker)?;
-    let alone = |id: &BatchId| {
+    let own_time = |id: &BatchId| {
         let Assignment { job, indices, .. } = state.batches.get(id)?.assignment;
         let pace = state.jobs.get(&job)?.pace.expected_time(indices.count, worker.hello.slots);
         let rate = worker.rates.get(&job);
         pace.max(rate.map(|rate| fairness::slot_time(indices.count as f64 / rate, 1)))
     };
     let before = worker.in_flight.iter().filter(|held| **held < id);
-    let before: Duration = before.filter_map(alone).sum();
-    Some(before + alone(&id)?)
+    let before: Duration = before.filter_map(own_time).sum();
+    Some(before + own_time(&id)?)
 }
 
 /// Puts a worker on probation that has held an overdue batch for too long.
@@ -231,9 +231,9 @@ fn risks_failing(state: &State, batch: &Batch, crashes: &Crashes, now: Duration)
 /// Returns whether a worker may get a duplicate of a batch: it is eligible, and holds no overdue batch
 /// itself.
 fn is_fit(state: &State, id: BatchId, worker: &AttachedWorker, now: Duration) -> bool {
-    let late = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
+    let has_overdue = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
     let trusted = state.is_sound(worker) || may_be_tried(state, id, worker, now);
-    trusted && may_have(state, id, &worker.name) && !late()
+    trusted && may_have(state, id, &worker.name) && !has_overdue()
 }
 
 /// Returns whether a worker on probation may be tried with a duplicate of this batch. Audits are not
@@ -267,7 +267,7 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
     let Some(evaluation) = state.evaluation_of(&batch.assignment) else {
         return false;
     };
-    let about = |it: &&Dispute| it.tie_breakers.contains(&id);
+    let has_tie_breaker = |it: &&Dispute| it.tie_breakers.contains(&id);
     let in_question = match batch.purpose {
         Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => false,
         Purpose::Proof => true,
@@ -275,9 +275,11 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
             let by = evaluation.owner(batch.assignment.indices.first);
             by.is_none_or(|by| by.host() == name.host())
         }
-        Purpose::TieBreak => {
-            evaluation.disputes.iter().find(about).is_none_or(|it| it.has_vote_of(name.host()))
-        }
+        Purpose::TieBreak => evaluation
+            .disputes
+            .iter()
+            .find(has_tie_breaker)
+            .is_none_or(|it| it.has_vote_of(name.host())),
     };
     let is_check = !batch.purpose.fills();
     let in_common =

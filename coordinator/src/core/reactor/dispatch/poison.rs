@@ -54,10 +54,10 @@ pub(crate) fn dispatch(turn: &mut Turn) -> BTreeSet<WorkerId> {
 fn choose_quarantined(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let crashes = |index: &u64| evaluation.crashes.get(index);
-    let open = |index: &&u64| {
+    let is_open = |index: &&u64| {
         crashes(index).is_none_or(|crashes| !crash_limit_reached(state, crashes, |_| true))
     };
-    let index = evaluation.quarantine.iter().find(open)?;
+    let index = evaluation.quarantine.iter().find(is_open)?;
     let nobody = Crashes::default();
     let crashes = crashes(index).unwrap_or(&nobody);
     Some((*index, choose_worker(state, crashes, now)?))
@@ -108,8 +108,8 @@ pub(crate) fn forget_old_crashes(state: &mut State, now: Duration) {
 /// Returns the failure of a job with a poison realization, if it has one.
 pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<RunFailure> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
-    let over = |index: &u64| Some((*index, evaluation.crashes.get(index)?));
-    let waiting = evaluation.quarantine.iter().filter_map(over);
+    let crashes_over = |index: &u64| Some((*index, evaluation.crashes.get(index)?));
+    let waiting = evaluation.quarantine.iter().filter_map(crashes_over);
     let is_poison = |(_, crashes): &(u64, &Crashes)| is_poison(state, crashes, |_| true, now);
     let (index, crashes) = waiting.into_iter().find(is_poison)?;
     let hosts = crashes.hosts().into_iter().collect::<Vec<_>>().join(", ");
@@ -137,8 +137,8 @@ pub(crate) fn is_poison(
     of: impl Fn(&WorkerName) -> bool,
     now: Duration,
 ) -> bool {
-    let long = |last| now.saturating_sub(last) >= state.config.expiry;
-    crashes.last().is_some_and(long) && crash_limit_reached(state, crashes, of)
+    let is_long_ago = |last| now.saturating_sub(last) >= state.config.expiry;
+    crashes.last().is_some_and(is_long_ago) && crash_limit_reached(state, crashes, of)
 }
 
 /// Returns whether no further worker in `of` shall be risked for a task over which `crashes`
@@ -148,12 +148,12 @@ pub(crate) fn crash_limit_reached(
     crashes: &Crashes,
     of: impl Fn(&WorkerName) -> bool,
 ) -> bool {
-    let untried = |worker: &AttachedWorker| {
+    let is_untried = |worker: &AttachedWorker| {
         let (failing, silent, lost, _) = reputation(state, worker, crashes);
         let stayed = crashes.first().is_some_and(|first| worker.attached < first);
         !worker.draining && !silent && !failing && (stayed || !lost) && of(&worker.name)
     };
-    crashes.reach_limit(|| state.workers.values().any(untried))
+    crashes.reach_limit(|| state.workers.values().any(is_untried))
 }
 
 /// Returns the reputation of a worker for a task over which `crashes` happened.

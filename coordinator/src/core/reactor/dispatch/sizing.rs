@@ -212,8 +212,8 @@ pub(crate) fn measure_fleet(state: &State, id: JobId) -> FleetRate {
     let per_slot = if slots > 0.0 { all / slots } else { 1.0 };
     let weight =
         |worker: &AttachedWorker| rates(worker).unwrap_or(f64::from(worker.hello.slots) * per_slot);
-    let sound = || state.workers.values().filter(|it| state.is_sound(it));
-    let (total, workers) = (sound().map(weight).sum(), sound().count());
+    let sound_workers = || state.workers.values().filter(|it| state.is_sound(it));
+    let (total, workers) = (sound_workers().map(weight).sum(), sound_workers().count());
     let rated_workers = state.jobs.get(&id).map_or(0, |job| job.rated_workers);
     FleetRate { total, workers, per_slot, rated_workers, changes: state.fleet_changes, uses: 1 }
 }

@@ -80,11 +80,11 @@ pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
 
 /// Drops the speculative evaluations of a job that contain answers of a banned host.
 pub(crate) fn forget(turn: &mut Turn, id: JobId, host: &str) {
-    let contributed = |evaluation: &PendingEvaluation| {
+    let has_contribution = |evaluation: &PendingEvaluation| {
         WorkerName::any_of(&evaluation.workers, host)
             || evaluation.disputes.iter().any(|dispute| dispute.has_vote_of(host))
     };
-    retain(turn, id, |evaluation| !contributed(evaluation));
+    retain(turn, id, |evaluation| !has_contribution(evaluation));
 }
 
 /// Drops the newest speculative evaluations, then those of the last branches, until the limit on

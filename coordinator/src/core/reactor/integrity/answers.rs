@@ -38,8 +38,9 @@ pub(crate) fn take_answer(
     attached.rate.add(solved.len() as u64, turn.now);
     let name = attached.name.clone();
     let held = turn.state.batches.get(&batch).filter(|held| held.worker == worker);
-    let late = || attached.settled.iter().find(|(id, _)| *id == batch).map(|(_, about)| *about);
-    let Some(assignment) = held.map(|held| held.assignment).or_else(late) else {
+    let find_settled =
+        || attached.settled.iter().find(|(id, _)| *id == batch).map(|(_, about)| *about);
+    let Some(assignment) = held.map(|held| held.assignment).or_else(find_settled) else {
         return;
     };
     let (purpose, duplicates) = held.map(|held| (held.purpose, held.duplicates.clone())).unzip();

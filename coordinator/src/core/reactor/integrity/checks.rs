@@ -139,8 +139,8 @@ pub(crate) fn take_proof(
 /// that waited for it.
 pub(crate) fn decide_proofs(turn: &mut Turn, setup: &SetupKey) {
     ban_outvoted_by_proofs(turn, setup);
-    let of_setup = |id: &&JobId| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup);
-    let jobs: Vec<JobId> = turn.state.active.iter().filter(of_setup).copied().collect();
+    let has_setup = |id: &&JobId| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup);
+    let jobs: Vec<JobId> = turn.state.active.iter().filter(has_setup).copied().collect();
     for id in jobs {
         let attempts = turn.state.jobs.get(&id).into_iter().flat_map(Job::certain_evaluations);
         let attempts: Vec<u64> = attempts.map(|evaluation| evaluation.attempt).collect();
@@ -173,9 +173,9 @@ pub(crate) fn take_tie_break(
     solved: Vec<RealizationResult>,
     by: &WorkerName,
 ) {
-    let of_batch = |dispute: &Dispute| dispute.tie_breakers.contains(&batch);
-    let found = |it: &mut PendingEvaluation| it.disputes.iter().position(of_batch);
-    let at = turn.state.evaluation_of_mut(assignment).and_then(found);
+    let has_tie_breaker = |dispute: &Dispute| dispute.tie_breakers.contains(&batch);
+    let find_dispute = |it: &mut PendingEvaluation| it.disputes.iter().position(has_tie_breaker);
+    let at = turn.state.evaluation_of_mut(assignment).and_then(find_dispute);
     turn.state.settle(batch);
     let Some((at, evaluation)) = at.zip(turn.state.evaluation_of_mut(assignment)) else {
         return;
@@ -188,8 +188,8 @@ pub(crate) fn take_tie_break(
 
 /// Ends a dispute of an evaluation if one answer has the majority.
 fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
-    let of_attempt = |it: &&PendingEvaluation| it.attempt == attempt;
-    let found = turn.state.jobs.get(&job).and_then(|job| job.evaluations().find(of_attempt));
+    let has_attempt = |it: &&PendingEvaluation| it.attempt == attempt;
+    let found = turn.state.jobs.get(&job).and_then(|job| job.evaluations().find(has_attempt));
     let Some(dispute) = found.and_then(|evaluation| evaluation.disputes.get(at)) else {
         return;
     };
@@ -310,8 +310,8 @@ fn find_undecided(
         let others = |name: &WorkerName| !dispute.has_vote_of(name.host());
         let nobody = !state.answers_batches(others);
         let lethal = poison::is_poison(state, &dispute.crashes, others, now);
-        let waited_for = |tie_breaker| overdue::is_waited_for(state, tie_breaker, now);
-        !dispute.tie_breakers.iter().copied().any(waited_for) && (lethal || (nobody && !patient))
+        let is_waited_for = |tie_breaker| overdue::is_waited_for(state, tie_breaker, now);
+        !dispute.tie_breakers.iter().copied().any(is_waited_for) && (lethal || (nobody && !patient))
     };
     let dispute = evaluation.disputes.iter().find(hopeless)?;
     let contradiction = Box::new(dispute.ballot.contradiction()?);

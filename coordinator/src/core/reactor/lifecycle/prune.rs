@@ -88,8 +88,8 @@ fn choose_jobs(state: &State, retention: Retention, now: Duration) -> Vec<JobId>
     ended.sort_unstable();
     let keep_last = usize::try_from(keep_last.unwrap_or(0)).unwrap_or(usize::MAX);
     ended.truncate(ended.len().saturating_sub(keep_last));
-    let young = |at: Duration| keep_for.is_some_and(|age| now.saturating_sub(at) <= age);
-    ended.retain(|(at, _)| !young(*at));
+    let is_young = |at: Duration| keep_for.is_some_and(|age| now.saturating_sub(at) <= age);
+    ended.retain(|(at, _)| !is_young(*at));
     let mut jobs: Vec<JobId> = ended.into_iter().map(|(_, id)| id).collect();
     jobs.sort_unstable();
     jobs

@@ -126,14 +126,18 @@ fn find_place(state: &State, client: &str) -> Result<(), Refusal> {
 
 /// Checks that a specification of `more` bytes fits beside those of the jobs that have not ended.
 fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
-    let of = |whose: &dyn Fn(&str) -> bool| -> u64 {
+    let held_bytes = |whose: &dyn Fn(&str) -> bool| -> u64 {
         let jobs = state.jobs.values().filter(|job| whose(&job.record.client));
         jobs.map(|job| job.bytes).sum()
     };
     let limit = state.config.jobs_bytes_max;
     for (whose, held, limit) in [
-        ("this client's", of(&|name| name == client), limit / u64::from(CLIENT_SHARE_DIVISOR)),
-        ("all", of(&|_| true), limit),
+        (
+            "this client's",
+            held_bytes(&|name| name == client),
+            limit / u64::from(CLIENT_SHARE_DIVISOR),
+        ),
+        ("all", held_bytes(&|_| true), limit),
     ] {
         if held + more > limit {
             return Err(Refusal::TooMuchQueued { whose, held, more, limit });

@@ -27,25 +27,25 @@ pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
         return;
     }
     tracing::warn!(?gap, "the coordinator was paused; all leases are extended by the gap");
-    let excused = |since: &mut Duration| *since = (*since + gap).min(now);
+    let excuse = |since: &mut Duration| *since = (*since + gap).min(now);
     for worker in state.workers.values_mut() {
-        excused(&mut worker.last_seen);
-        excused(&mut worker.answered);
-        excused(&mut worker.missed.since);
+        excuse(&mut worker.last_seen);
+        excuse(&mut worker.answered);
+        excuse(&mut worker.missed.since);
     }
     for batch in state.batches.values_mut() {
-        excused(&mut batch.sent);
-        excused(&mut batch.begun);
+        excuse(&mut batch.sent);
+        excuse(&mut batch.begun);
     }
     for job in state.jobs.values_mut() {
         if let Some(retry) = &mut job.store_retry {
-            excused(&mut retry.since);
+            excuse(&mut retry.since);
         }
         for evaluation in job.evaluations_mut() {
-            evaluation.crashes.values_mut().for_each(|crashes| crashes.shift(excused));
+            evaluation.crashes.values_mut().for_each(|crashes| crashes.shift(excuse));
             for dispute in &mut evaluation.disputes {
-                excused(&mut dispute.since);
-                dispute.crashes.shift(excused);
+                excuse(&mut dispute.since);
+                dispute.crashes.shift(excuse);
             }
         }
     }

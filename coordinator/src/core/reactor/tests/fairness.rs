@@ -55,7 +55,7 @@ fn large_evaluations_wait_for_room() {
 
 #[test]
 fn what_waits_is_bounded_in_bytes() {
-    let of = |client: &str, velocities: usize| {
+    let submit_large = |client: &str, velocities: usize| {
         let mut specification = identification(1);
         specification.data = Some(Data::from_velocities(vec![3900.0; velocities]));
         let (specification, client) = (Arc::new(specification), client.to_owned());
@@ -73,7 +73,7 @@ fn what_waits_is_bounded_in_bytes() {
     let mut rig = Rig::new();
     rig.state.config.jobs_bytes_max = 420_000;
     let mut accepted = |client, velocities| {
-        let effects = rig.event(of(client, velocities));
+        let effects = rig.event(submit_large(client, velocities));
         if effects[0].starts_with("answer 0: the specifications of ") {
             return effects[0].split(' ').nth(6).map(str::to_owned);
         }
@@ -96,7 +96,7 @@ fn what_waits_is_bounded_in_bytes() {
     rig.event(stored_event(job.0, RecordKey::Job));
     rig.event(request(1, Request::Cancel(job)));
     rig.event(stored_event(job.0, RecordKey::End));
-    let effects = rig.event(of("e", 12_000));
+    let effects = rig.event(submit_large("e", 12_000));
     assert!(effects[0].starts_with("store job "), "{effects:?}");
 }
 

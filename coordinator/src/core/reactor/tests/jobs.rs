@@ -56,7 +56,7 @@ fn a_submission_is_idempotent_by_its_request_id() {
 
 #[test]
 fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
-    let of = |reply_id, client: &str, realizations| {
+    let submit_as = |reply_id, client: &str, realizations| {
         let Event::Requested { reply_id, request } =
             submit(reply_id, "r", propagation(realizations))
         else {
@@ -71,14 +71,14 @@ fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
         Event::Requested { reply_id, request }
     };
     let mut rig = Rig::new();
-    rig.check(of(1, "ann", 2), &["store job 1"]);
-    rig.check(of(2, "bob", 3), &["store job 2"]);
+    rig.check(submit_as(1, "ann", 2), &["store job 1"]);
+    rig.check(submit_as(2, "bob", 3), &["store job 2"]);
     rig.check(stored_event(1, RecordKey::Job), &["answer 1: job 1"]);
     rig.check(stored_event(2, RecordKey::Job), &["answer 2: job 2"]);
-    rig.check(of(3, "ann", 2), &["answer 3: job 1"]);
-    rig.check(of(4, "bob", 3), &["answer 4: job 2"]);
+    rig.check(submit_as(3, "ann", 2), &["answer 3: job 1"]);
+    rig.check(submit_as(4, "bob", 3), &["answer 4: job 2"]);
     // An id of one client may be used by another.
-    rig.check(of(5, "cem", 4), &["store job 3"]);
+    rig.check(submit_as(5, "cem", 4), &["store job 3"]);
 }
 
 #[test]
