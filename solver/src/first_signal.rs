@@ -42,8 +42,8 @@ pub struct ObservedRealization {
 }
 
 impl Solver {
-    /// Same as [`Solver::realization`], with the decay, which takes no further pass. A realization whose
-    /// decay is not finite is the failure `not_finite`.
+    /// Computes realization `index` of an ensemble as [`Solver::realization`] does, and its decay, which
+    /// takes no further pass. If the decay is not finite, the realization fails as `not_finite`.
     pub fn realization_with_decay(
         &self,
         ensemble: &Ensemble,
@@ -54,7 +54,7 @@ impl Solver {
             Ok(arrival) => arrival,
             Err(kind) => return RealizationResult::failed(kind),
         };
-        // A random setup moves receivers along the probe never, and its tilt turns them with it.
+        // A random setup never moves receivers along the probe, and a tilt turns them with it.
         let distances: Vec<f64> = self.setup().probe.distances().collect();
         let Arrival { velocity, estimated_error, amplitudes, .. } = arrival;
         let decay = decay(&distances, &amplitudes);

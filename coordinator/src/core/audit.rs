@@ -41,7 +41,7 @@ pub(crate) fn is_chosen(
     uniform(key, [job.0, number, first]) < fraction
 }
 
-/// When answers of a worker are audited next, and how many realizations of them.
+/// When answers of a worker are audited next, and how many of their realizations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NextAudit {
     /// Number of realizations that it computes until then.
@@ -59,8 +59,9 @@ impl NextAudit {
 }
 
 /// Returns which of the realizations `answered` by a worker are audited, `None` if none are due, and the audit
-/// after this one. So that a machine that breaks is found soon, few realizations are audited often, `least` at a
-/// time. When they are due is drawn, so that no worker can foresee it: twice the mean at the latest.
+/// after this one. Few realizations, but at least `least`, are audited at a time and often, so that a machine that
+/// breaks is found soon. When the next audit is due is drawn, so that no worker can foresee it; the interval is at
+/// most twice the mean.
 pub(crate) fn choose(
     (key, fraction): (&AuditKey, f64),
     (batch, least): (BatchId, u64),
@@ -80,15 +81,15 @@ pub(crate) fn choose(
     if fraction >= 1.0 {
         return (Some(audited), NextAudit { left: 0.0, length });
     }
-    // What this answer had too much, and what was audited more than was planned, counts for the next, so that
-    // the fraction is kept.
+    // The realizations of this answer after the audit was due, and those that were audited beyond the plan, change
+    // when the next audit is due, so that the fraction is kept.
     let unplanned = (length as f64 - due.length as f64) / fraction;
     let next = share.max(least).min(answered.count);
     let left = left + unplanned + distance(fraction, next, draw(1));
     (Some(audited), NextAudit { left, length: next })
 }
 
-/// Returns the number of realizations for which this many audited ones are the fraction, times 2 u.
+/// Returns the number of realizations of which `audited` are the fraction, times 2 u.
 fn distance(fraction: f64, audited: u64, u: f64) -> f64 {
     if fraction >= 1.0 { 0.0 } else { 2.0 * u * audited as f64 / fraction }
 }

@@ -29,7 +29,7 @@ pub struct Gathered {
     /// Number of the attempt at it.
     pub(crate) attempt: u64,
     pub(crate) record: EvaluationRecord,
-    /// The evaluations stored after it belong to another path.
+    /// Whether the evaluations stored after it belong to another path.
     pub(crate) is_last: bool,
 }
 

@@ -83,7 +83,7 @@ pub(crate) fn concerns(state: &State, now: Duration) -> Vec<Concern> {
     found
 }
 
-/// Returns the concerns that the log was not told of yet.
+/// Returns the concerns that the coordinator's log does not say yet.
 pub(crate) fn new_ones(state: &mut State, now: Duration) -> Vec<Concern> {
     let mut all = concerns(state, now);
     let kinds: Vec<ConcernKind> = all.iter().map(Concern::kind).collect();

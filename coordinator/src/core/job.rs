@@ -220,8 +220,8 @@ pub(crate) enum Stage {
         /// Evaluations stored after it belong to another path of the search and are deleted.
         is_last: bool,
     },
-    /// Evaluations that the search need only be exchanged for are being stored: they were complete
-    /// before it asked for them, or are completed beside the core.
+    /// Evaluations are being stored that were complete before the search asked for them, or are completed
+    /// beside the core. Once they are durable, the search is replaced by the one that has taken them in.
     StoringPrepared {
         /// The evaluations, with consecutive numbers; not empty.
         records: Vec<EvaluationRecord>,
@@ -270,7 +270,7 @@ pub(crate) struct Settled {
     pub(crate) point: Point,
     /// All workers whose answers are among the results.
     pub(crate) workers: Vec<WorkerName>,
-    /// Contents of the store for it.
+    /// What the store has of it.
     pub(crate) stored: StoredRecord,
 }
 

@@ -35,9 +35,9 @@ pub(crate) struct StateMeasurements {
     pub(crate) batches_in_flight: u64,
     /// Time since the oldest batch that a worker holds was sent.
     pub(crate) oldest_batch: Duration,
-    /// Time since which the store has refused a record.
+    /// Time for which the store has refused a record.
     pub(crate) store_refusing: Duration,
-    /// Time since which the store's log could not be copied into the database, and its length, bytes.
+    /// Time for which the store's log could not be copied into the database.
     pub(crate) log_stuck: Duration,
     pub(crate) log_stuck_bytes: u64,
     /// Used part of each bound, 0 to 1.
@@ -45,7 +45,6 @@ pub(crate) struct StateMeasurements {
 }
 
 impl StateMeasurements {
-    /// Measures a state.
     pub(crate) fn new(state: &State, now: Duration) -> Self {
         let since =
             |then: Option<Duration>| then.map_or(Duration::ZERO, |it| now.saturating_sub(it));
@@ -128,8 +127,7 @@ fn slots_wanted(job: &Job) -> u64 {
     (worth as u64).clamp(realizations.min(1), realizations)
 }
 
-/// Returns the time since which a record has been refused by the store; the oldest, if there are
-/// several.
+/// Returns since when the store has refused a record; of several, the one refused for longest.
 fn oldest_refusal(state: &State) -> Option<Duration> {
     let jobs = state.jobs.values().filter_map(|job| Some(job.store_retry.as_ref()?.since));
     let bans = state.banned.iter().filter(|banned| banned.refused).map(|banned| banned.record.at);

@@ -54,14 +54,14 @@ fn apply(turn: &mut Turn, event: Event) {
     match event {
         Event::Tick => tick(turn),
         Event::Requested { reply_id, request } => requests::handle_request(turn, reply_id, request),
-        Event::Hello { worker, hello } => workers::hello(turn, worker, hello),
+        Event::Hello { worker, hello } => workers::on_hello(turn, worker, hello),
         Event::Answered { worker, batch, solved, elapsed_s } => {
             answers::take_answer(turn, worker, batch, solved, elapsed_s);
         }
         Event::Heartbeat { worker } => workers::note_sign_of_life(turn.state, worker, turn.now),
-        Event::WorkerDrains { worker } => workers::drains(turn, worker),
+        Event::WorkerDrains { worker } => workers::on_draining(turn, worker),
         Event::Misbehaved { worker, reason } => workers::close(turn, worker, reason),
-        Event::StreamEnded { worker } => workers::stream_ended(turn, worker),
+        Event::StreamEnded { worker } => workers::on_stream_ended(turn, worker),
         Event::Gathered(gathered) => jobs::store_gathered(turn, gathered),
         Event::Completed(completed) => records::on_completed(turn, completed),
         Event::Stored { key: RecordKey::Ban(number), .. } => bans::on_ban_stored(turn, number),

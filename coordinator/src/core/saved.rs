@@ -1,5 +1,5 @@
-//! Results of incomplete evaluations: saved while a coordinator runs, as parts, which are used by the next one,
-//! and as pieces, of which the record of the evaluation will consist.
+//! Results of incomplete evaluations. They are saved while a coordinator runs: as parts, which the next coordinator
+//! uses, and as pieces, of which the record of the evaluation will consist.
 //!
 //! A large evaluation takes a while, and so do many that wait for their search to ask for them. If the
 //! coordinator dies, only what was answered last is computed again.

@@ -353,7 +353,7 @@ impl State {
     }
 
     /// Returns whether any ban is not durable yet.
-    pub(crate) fn ban_pending(&self) -> bool {
+    pub(crate) fn has_pending_ban(&self) -> bool {
         self.banned.iter().any(|banned| banned.store_at.is_some())
     }
 
@@ -415,7 +415,7 @@ impl State {
     /// Returns whether an attached worker of another host answers batches, so that it can check answers.
     pub(crate) fn can_check(&self, host: &str) -> bool {
         let other = |worker: &AttachedWorker| worker.name.host() != host && self.is_checker(worker);
-        self.several_hosts() && !self.draining && self.workers.values().any(other)
+        self.has_several_hosts() && !self.draining && self.workers.values().any(other)
     }
 
     /// Returns whether a worker may check the answers of others: it answers batches. With proofs, that is
@@ -425,7 +425,7 @@ impl State {
     }
 
     /// Returns whether the attached workers are of several hosts.
-    pub(crate) fn several_hosts(&self) -> bool {
+    pub(crate) fn has_several_hosts(&self) -> bool {
         self.hosts.len() > 1
     }
 

@@ -34,7 +34,7 @@ pub(crate) struct Gate {
 /// Why a request is not answered.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub(crate) enum GateRefusal {
-    /// The host may be another's, whose name leads here.
+    /// The request names a host that may be somebody else's, although the name leads here.
     #[error(
         "the host {host:?} is not known: the page answers for addresses, localhost and the name of this \
          machine; other names need --http-host NAME, or a coordinator with tokens"

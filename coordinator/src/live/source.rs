@@ -31,7 +31,7 @@ use crate::store::thread::StoreCommand;
 const STREAMS_MAX: usize = 64;
 /// Time after which a page that was refused may ask again.
 const RETRY: Duration = Duration::from_secs(5);
-/// Time limit for an answer of the core task, but for a cancellation, which has its own.
+/// Time limit for an answer of the core task, except to a cancellation, which has its own.
 const CORE_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Where the numbers come from.

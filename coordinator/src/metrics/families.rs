@@ -30,7 +30,7 @@ pub(crate) struct Scrape {
 /// One metric, with a value for each of its labels.
 #[derive(Debug)]
 pub(crate) struct MetricFamily {
-    /// Complete name, but for the suffix `_total` of a counter.
+    /// Complete name, except for the suffix `_total` of a counter.
     pub(crate) name: &'static str,
     pub(crate) help: &'static str,
     pub(crate) values: Values,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::core::distribution::TimeDistribution;
 
 /// The times of all writes, shared by the store's thread and those who read them. A write takes
-/// a thousand times as long as the lock.
+/// a thousand times as long as the lock is held, so the lock delays nobody.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WriteTimes(Arc<Mutex<TimeDistribution>>);
 

@@ -61,7 +61,7 @@ impl Clock {
     }
 }
 
-/// What follows the events of the core.
+/// What observes the events of the core for operators.
 pub(crate) struct Monitoring {
     /// Present if metrics are exported.
     pub(crate) meter: Option<Meter>,
@@ -74,9 +74,9 @@ pub(crate) struct Core {
     state: State,
     clock: Clock,
     commands: mpsc::Sender<StoreCommand>,
-    /// Leads back to this task.
+    /// Sends events back to this task.
     events: mpsc::Sender<Event>,
-    /// Of the connections of clients and workers.
+    /// Places for the connections of clients and workers.
     places: Places,
     next_reply_id: u64,
     waiting: BTreeMap<ReplyId, oneshot::Sender<Answer>>,
@@ -292,7 +292,8 @@ impl Core {
         }
     }
 
-    /// Has the store make an ended job an unfinished one; returns the event that it cannot be asked.
+    /// Asks the store to make an ended job an unfinished one again; returns the event of a failure if the
+    /// store cannot be asked.
     fn reopen(&self, reply_id: ReplyId, job: JobId) -> Option<Event> {
         let refused = self.commands.try_send(StoreCommand::Reopen { reply_id, job }).err()?;
         Some(Event::Reopened { reply_id, job, outcome: Err(refused.to_string()) })

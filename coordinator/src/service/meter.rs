@@ -17,7 +17,7 @@ pub(crate) struct Meter {
     event_times: TimeDistribution,
 }
 
-/// The begin of a reaction.
+/// The beginning of a reaction.
 #[derive(Debug)]
 pub(crate) struct Reading {
     begun: Instant,

@@ -54,7 +54,7 @@ struct Heights {
     lowest: f64,
     /// Height of a receiver above the next lower one; 0 if all have one height.
     step: f64,
-    /// Whether receivers are the lower, the larger their number.
+    /// Whether receivers with larger numbers are lower.
     falling: bool,
 }
 

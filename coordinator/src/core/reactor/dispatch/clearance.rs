@@ -100,8 +100,8 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
 }
 
 /// Queues an audit of one realization of the last answer of each worker, so that a machine that has broken
-/// meanwhile is found before the evaluation counts. Where that were more than the fraction of the realizations
-/// that is audited, as with many workers, it is found by its next audit.
+/// meanwhile is found before the evaluation counts. With so many workers that these would be more than the
+/// fraction of the realizations that is audited, none is queued, and the machine is found by its next audit.
 fn audit_last_answers(turn: &mut Turn, id: JobId, attempt: u64) {
     let (key, fraction) = (turn.state.config.audit_key, turn.state.config.audit_fraction);
     let state = &*turn.state;
@@ -169,7 +169,7 @@ fn audit_last(evaluation: &mut PendingEvaluation, place: usize, one: Option<&aud
     evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
 }
 
-/// Puts workers on probation that do not give their proof of a setup, and asks further hosts where no answer has a
+/// Puts workers on probation that do not give their proof of a setup, and asks further hosts if no answer has a
 /// majority.
 pub(crate) fn look_for_majority(turn: &mut Turn, setup: &SetupKey) {
     let Some(proofs) = turn.state.proofs.for_setup(setup) else {
@@ -189,7 +189,7 @@ pub(crate) fn look_for_majority(turn: &mut Turn, setup: &SetupKey) {
     ask_for_majority(turn, setup);
 }
 
-/// Asks further hosts where those asked have no majority. Notes since when there is none.
+/// Asks further hosts if no answer of those asked has a majority, and notes since when that is so.
 fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) {
     let Some(proofs) = turn.state.proofs.for_setup(setup) else {
         return;

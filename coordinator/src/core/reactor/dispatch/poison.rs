@@ -1,10 +1,10 @@
 //! Quarantined realizations: those that were alone in a batch of a lost worker. This file decides
 //! which worker gets them, and when so many workers crashed over one that it is poison.
 //!
-//! A bad node that has just come back holds nothing, so being idle is no evidence for a worker: a
-//! quarantined realization goes to the worker with the best reputation, and waits for it. One over
-//! which a worker was lost goes to the worker that has been attached longest among these, so that a
-//! node that comes and goes does not get it while another worker is there.
+//! A bad node that has just come back holds nothing, so an idle worker is not for that reason a good one:
+//! a quarantined realization goes to a worker with the best reputation, and waits for it. If a worker was
+//! lost over the realization, it goes to the one of these that has been attached longest, so that a node
+//! that comes and goes does not get it while another worker is there.
 
 use std::collections::BTreeSet;
 use std::time::Duration;

@@ -202,7 +202,7 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, (before, now): (Dur
     let plausible = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
     let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);
     let rate = batch.assignment.indices.count as f64 / if plausible { elapsed_s } else { waited_s };
-    // Others waited behind the batch before them.
+    // A batch that was sent before that answer waited behind the answered one.
     if plausible && batch.sent >= before {
         state.delay.learn(waited_s, elapsed_s);
     }

@@ -96,7 +96,7 @@ pub(crate) fn contradicts_itself(
     contradiction: Contradiction,
 ) {
     let [(_, earlier), (_, later)] = contradiction.answers;
-    if turn.state.several_hosts() {
+    if turn.state.has_several_hosts() {
         let what = format!("{} and as {}", describe_answer(earlier), describe_answer(later));
         let reason = format!("answered realization {} as {what}", contradiction.index);
         bans::ban(turn, by, assignment.job, reason);
@@ -156,7 +156,7 @@ fn ban_outvoted_by_proofs(turn: &mut Turn, setup: &SetupKey) {
         return;
     };
     if proofs.ballot.is_unanimous() {
-        // The voters of a thousand hosts need not be counted after each proof.
+        // Saves counting the voters among a thousand hosts after each proof.
         return;
     }
     let verdict = proofs.ballot.verdict(clearance::proof_voters(turn.state, setup, turn.now));

@@ -327,7 +327,7 @@ pub(crate) fn cancelled_ending() -> Ending {
 
 /// Requests the next stored evaluation of a job, unless a ban is not durable yet.
 pub(crate) fn read_next(turn: &mut Turn, id: JobId) {
-    let may = !turn.state.ban_pending();
+    let may = !turn.state.has_pending_ban();
     if let Some(job) = turn.state.jobs.get_mut(&id) {
         job.stage = Stage::Replaying { asked: may };
         if may {

@@ -16,7 +16,7 @@ use osteon_search::Step;
 
 /// Continues replays that waited for a ban to be durable.
 pub(crate) fn continue_replays(turn: &mut Turn) {
-    if turn.state.ban_pending() {
+    if turn.state.has_pending_ban() {
         return;
     }
     for (&id, job) in &mut turn.state.jobs {

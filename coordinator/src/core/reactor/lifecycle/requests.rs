@@ -192,7 +192,7 @@ fn cancel(turn: &mut Turn, reply_id: ReplyId, id: JobId) -> Option<Answer> {
 
 /// Drains a worker, and returns its snapshot.
 fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
-    match workers::send_away(turn, worker) {
+    match workers::drain_worker(turn, worker) {
         Ok(()) => worker_list::worker_snapshot(turn.state, worker, turn.now)
             .map_or(Answer::Refused(Refusal::NoWorker { worker }), Answer::Worker),
         Err(refusal) => Answer::Refused(refusal),

@@ -19,7 +19,7 @@ use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, MissedBatches, State};
 use crate::core::worker_name::WorkerName;
 
-pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
+pub(crate) fn on_hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
     if turn.state.workers.contains_key(&worker) {
         close(turn, worker, CloseReason::SecondHello);
         return;
@@ -82,7 +82,7 @@ pub(crate) fn note_sign_of_life(state: &mut State, worker: WorkerId, now: Durati
     }
 }
 
-pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
+pub(crate) fn on_draining(turn: &mut Turn, worker: WorkerId) {
     note_sign_of_life(turn.state, worker, turn.now);
     begin_draining(turn.state, worker);
     batches::preempt(turn, worker);
@@ -94,7 +94,7 @@ pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
 ///
 /// # Errors
 /// When no such worker is attached.
-pub(crate) fn send_away(turn: &mut Turn, worker: WorkerId) -> Result<(), Refusal> {
+pub(crate) fn drain_worker(turn: &mut Turn, worker: WorkerId) -> Result<(), Refusal> {
     let attached = turn.state.workers.get(&worker).ok_or(Refusal::NoWorker { worker })?;
     if !attached.draining {
         begin_draining(turn.state, worker);
@@ -125,7 +125,7 @@ pub(crate) fn close(turn: &mut Turn, worker: WorkerId, reason: CloseReason) {
 }
 
 /// Handles the end of a worker's stream; the batches that it held are reassigned.
-pub(crate) fn stream_ended(turn: &mut Turn, worker: WorkerId) {
+pub(crate) fn on_stream_ended(turn: &mut Turn, worker: WorkerId) {
     remove_lost(turn, worker, Departure::StreamEnded);
 }
 
