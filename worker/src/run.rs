@@ -87,7 +87,7 @@ pub async fn run(
     run_on_backend(backend, config, shutdown).await
 }
 
-/// Same as [`run`], on a given device.
+/// As [`run`], on the computing device `backend`.
 async fn run_on_backend(
     backend: Box<dyn Backend>,
     config: WorkerConfig,

@@ -38,7 +38,7 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Returns whether the advisory database could be fetched in time.
+/// Fetches the advisory database; returns whether that succeeded in time.
 fn fetch_database(command: &mut Command) -> Result<bool> {
     announce(command);
     let mut child =

@@ -42,7 +42,7 @@ const GROUP_STEP: f64 = 1e-4;
 /// which is their fourth power, or of extension, their square.
 const THINNEST_FLEXURAL: f64 = 1e-2;
 const THINNEST_EXTENSIONAL: f64 = 1e-5;
-/// Where a count is undecided (a pivot is exactly zero), it is made this much farther.
+/// If a count is undecided because a pivot is exactly zero, it is repeated at the wavenumber times this.
 const BESIDE: f64 = 1.0 + 1e-13;
 
 /// One guided wave at one frequency.

@@ -24,7 +24,7 @@ const PRESSURES_MAX: f64 = 5e6;
 /// is rounded.
 const TO_BE_SAFE: f64 = 1.01;
 
-/// Kernel that computes the pressures at the receivers.
+/// The pressure at every receiver as a function of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traces {
     /// Times, s, from 0 on.

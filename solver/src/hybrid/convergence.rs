@@ -144,7 +144,7 @@ impl<'a> SmoothLoadStudy<'a> {
         Mesh::with_sizes(self.setup, &self.scope, order, [size; 3])
     }
 
-    /// Kernel that computes the largest stable time step, s.
+    /// Returns the largest stable time step, s.
     fn limit(&mut self, mesh: &Mesh) -> f64 {
         Isa::fastest().run(Limit {
             operator: &Operator::new(self.setup, self.bone, mesh),
