@@ -346,10 +346,10 @@ impl State {
         self.banned.iter().any(|banned| concerns(&banned.record))
     }
 
-    /// Returns the first running job with a setup.
-    pub(crate) fn active_job_of(&self, setup: &SetupKey) -> Option<JobId> {
+    /// Returns the running jobs with a setup, in the order of their identifiers.
+    pub(crate) fn active_jobs_of(&self, setup: &SetupKey) -> impl Iterator<Item = JobId> {
         let has_setup = |id: &&JobId| self.jobs.get(id).is_some_and(|job| job.setup == *setup);
-        self.active.iter().find(has_setup).copied()
+        self.active.iter().filter(has_setup).copied()
     }
 
     /// Returns whether any ban is not durable yet.

@@ -205,7 +205,8 @@ fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) {
     if voted < 2 || voters > voted || lacks == 0 {
         return;
     }
-    if let Some(job) = turn.state.active_job_of(setup) {
+    let job = turn.state.active_jobs_of(setup).next();
+    if let Some(job) = job {
         proofs::ask_further(turn, job, voted + lacks);
     }
 }

@@ -139,8 +139,7 @@ pub(crate) fn take_proof(
 /// that waited for it.
 pub(crate) fn decide_proofs(turn: &mut Turn, setup: &SetupKey) {
     ban_outvoted_by_proofs(turn, setup);
-    let has_setup = |id: &&JobId| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup);
-    let jobs: Vec<JobId> = turn.state.active.iter().filter(has_setup).copied().collect();
+    let jobs: Vec<JobId> = turn.state.active_jobs_of(setup).collect();
     for id in jobs {
         let attempts = turn.state.jobs.get(&id).into_iter().flat_map(Job::certain_evaluations);
         let attempts: Vec<u64> = attempts.map(|evaluation| evaluation.attempt).collect();
@@ -160,7 +159,8 @@ fn ban_outvoted_by_proofs(turn: &mut Turn, setup: &SetupKey) {
         return;
     }
     let verdict = proofs.ballot.verdict(clearance::proof_voters(turn.state, setup, turn.now));
-    if let Some((verdict, job)) = verdict.zip(turn.state.active_job_of(setup)) {
+    let job = turn.state.active_jobs_of(setup).next();
+    if let Some((verdict, job)) = verdict.zip(job) {
         ban_outvoted(turn, job, verdict);
     }
 }
