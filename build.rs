@@ -7,17 +7,23 @@ use std::process::Command;
 
 /// Files and directories of the program's source. A change in any of them runs this script again, so
 /// that it notices a modified tree.
-const SOURCES: [&str; 24] = [
+const SOURCES: [&str; 34] = [
     ".cargo",
     "Cargo.lock",
     "Cargo.toml",
     "build.rs",
+    "client/Cargo.toml",
+    "client/src",
     "common/Cargo.toml",
     "common/src",
     "coordinator/Cargo.toml",
     "coordinator/src",
     "files/Cargo.toml",
     "files/src",
+    "http/Cargo.toml",
+    "http/src",
+    "local/Cargo.toml",
+    "local/src",
     "proto/Cargo.toml",
     "proto/build.rs",
     "proto/osteon",
@@ -27,9 +33,13 @@ const SOURCES: [&str; 24] = [
     "rust-toolchain.toml",
     "search/Cargo.toml",
     "search/src",
+    "slurm/Cargo.toml",
+    "slurm/src",
     "solver/Cargo.toml",
     "solver/src",
     "src",
+    "umbridge/Cargo.toml",
+    "umbridge/src",
     "worker/Cargo.toml",
     "worker/src",
 ];

@@ -9,7 +9,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_files::job_file;
-use osteon_search::{CompletedJob, IdentifyError, identify};
+use osteon_search::{CompletedJob, IdentifyError, Realizations, identify};
 use osteon_solver::{Solver, Workspace};
 use rayon::prelude::*;
 
@@ -21,9 +21,9 @@ pub(crate) fn run(
     identify(specification, |realizations| {
         // It differs from the job's if quantities of the setup are searched.
         solver.change_setup(&realizations.point.setup(&specification.setup));
-        let solve = |workspace: &mut Workspace, index| match realizations.with_decays {
-            true => solver.realization_with_decay(&realizations.ensemble, index, workspace),
-            false => solver.realization(&realizations.ensemble, index, workspace),
+        let solve = |workspace: &mut Workspace, index| {
+            let Realizations { observables, ensemble, .. } = realizations;
+            solver.realization_with(*observables, ensemble, index, workspace)
         };
         let indices = (0..realizations.count).into_par_iter();
         Ok(indices.map_init(Workspace::default, solve).collect())

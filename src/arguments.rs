@@ -5,13 +5,9 @@ mod inputs;
 mod jobs;
 mod operators;
 mod realizations;
-mod report;
-mod services;
-mod slurm;
+pub(crate) mod services;
 mod tools;
-mod umbridge;
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -19,26 +15,21 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use osteon_proto::endpoint::Endpoint;
 
 use crate::program;
+use crate::wings::{ClusterWing, JobWing, ReportOption, RunPageOption};
 
 pub(crate) use check::CheckArguments;
 pub(crate) use inputs::{CaseFileArguments, JobFileArguments};
 pub(crate) use jobs::{
-    EarlierCommand, ExplainArguments, FetchArguments, JobArguments, JobCommand, JobListArguments,
-    PruneArguments, SubmitArguments, WatchArguments,
+    EarlierCommand, ExplainArguments, FetchArguments, JobArguments, JobCommand, PruneArguments,
+    SubmitArguments, WatchArguments,
 };
 pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
 pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
-pub(crate) use report::ReportArguments;
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
-pub(crate) use slurm::{
-    AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
-    WorkerArrayArguments,
-};
 pub(crate) use tools::{
     CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments, SchemaArguments,
     SchemaFile, VerbosityArguments,
 };
-pub(crate) use umbridge::UmbridgeArguments;
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
 #[derive(Debug, Parser)]
@@ -66,10 +57,9 @@ pub(crate) enum Command {
     Draw(DrawArguments),
     /// Compute all observables of a job's realizations: velocities, decay, frequency
     Observe(ObserveArguments),
-    /// Write a report of results: a page for a browser, figures as SVG, their numbers as CSV
-    Report(ReportArguments),
-    /// Serve a job's model to samplers and other programs by the UM-Bridge protocol, until interrupted
-    Umbridge(UmbridgeArguments),
+    /// Commands of wings.
+    #[command(flatten)]
+    JobWing(JobWing),
     /// Run a coordinator: accept jobs from clients and distribute them to workers, until interrupted
     Coordinator(CoordinatorArguments),
     /// Run a worker: compute realizations for a coordinator, until interrupted
@@ -79,8 +69,9 @@ pub(crate) enum Command {
     Job(JobCommand),
     /// List the workers of a coordinator
     Workers(WorkersArguments),
-    /// Print batch scripts for Slurm
-    Slurm(SlurmArguments),
+    /// Commands of wings.
+    #[command(flatten)]
+    ClusterWing(ClusterWing),
     /// Check whether a coordinator is serving: exit code 0 if it is, otherwise 1
     Health(HealthArguments),
     /// Copy the store of a coordinator while it runs
@@ -141,15 +132,12 @@ pub(crate) struct RunArguments {
     /// results of a complete one
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Also write a report of the results to DIR/report, as `osteon report DIR` does
-    #[arg(long, requires = "out")]
-    pub(crate) report: bool,
-    /// Show the run in a browser while it lasts: serve the live page at ADDR, a loopback address
-    /// (127.0.0.1:PORT; port 0 selects a free port). Its URL is printed on stderr. The job is run on
-    /// this machine
-    #[arg(long, value_name = "ADDR", conflicts_with = "coordinator",
-          value_parser = services::own_page_address)]
-    pub(crate) http: Option<SocketAddr>,
+    /// The report.
+    #[command(flatten)]
+    pub(crate) report: ReportOption,
+    /// The live page.
+    #[command(flatten)]
+    pub(crate) page: RunPageOption,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -190,9 +178,9 @@ pub(crate) struct SimulateArguments {
     /// the exact method). Each case needs its own directory
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Also write a report of the results to DIR/report, as `osteon report DIR` does
-    #[arg(long, requires = "out")]
-    pub(crate) report: bool,
+    /// The report.
+    #[command(flatten)]
+    pub(crate) report: ReportOption,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -304,7 +292,7 @@ pub(crate) struct InitArguments {
 }
 
 /// Longest span that a command line may ask for, s: a year.
-const SECONDS_MAX: f64 = 366.0 * 86_400.0;
+pub(crate) const SECONDS_MAX: f64 = 366.0 * 86_400.0;
 
 /// Longest age that a command line may ask for, s: a century.
 const AGE_S_MAX: f64 = 100.0 * SECONDS_MAX;
@@ -323,7 +311,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-fn age(text: &str) -> Result<Duration, String> {
+pub(crate) fn age(text: &str) -> Result<Duration, String> {
     let unit = text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
     let seconds = match unit {
         "s" => 1.0,
@@ -344,7 +332,7 @@ fn age(text: &str) -> Result<Duration, String> {
         })
 }
 
-fn job_name(text: &str) -> Result<String, String> {
+pub(crate) fn job_name(text: &str) -> Result<String, String> {
     let max = osteon_common::limits::NAME_BYTES_MAX;
     if text.len() > max || text.chars().any(char::is_control) {
         return Err(format!("it must have at most {max} bytes and no control characters"));

@@ -11,18 +11,14 @@ mod man;
 mod materials;
 mod observe;
 mod operators;
-mod report;
 mod run;
-mod scaling;
 mod schema;
 mod simulate;
-mod slurm;
 mod token;
-mod umbridge;
 mod worker;
 
 use crate::exit_status::{CommandFailure, ExitStatus};
-use crate::resolved::Resolved;
+use crate::resolved::{Resolved, WorkersOperation};
 use crate::signals::unless_interrupted;
 
 /// Executes the command line.
@@ -42,8 +38,6 @@ fn left_by_interruption(resolved: &Resolved) -> Option<&'static str> {
     match resolved {
         Resolved::Run { .. }
         | Resolved::Draw(_)
-        | Resolved::Report(_)
-        | Resolved::Umbridge(_)
         | Resolved::Coordinator(_)
         | Resolved::Worker { .. }
         | Resolved::Certs(_)
@@ -52,33 +46,24 @@ fn left_by_interruption(resolved: &Resolved) -> Option<&'static str> {
         | Resolved::Schema(_)
         | Resolved::Materials(_)
         | Resolved::Completions(_)
-        | Resolved::Man(_)
-        | Resolved::JobScript(_)
-        | Resolved::WorkerArray(_) => None,
-        Resolved::Check { .. }
-        | Resolved::Doctor { .. }
-        | Resolved::Jobs { .. }
-        | Resolved::Explain { .. }
-        | Resolved::Workers { .. }
-        | Resolved::Health { .. } => Some("nothing was changed"),
+        | Resolved::Man(_) => None,
+        Resolved::Check { .. } | Resolved::Doctor { .. } | Resolved::Health { .. } => {
+            Some("nothing was changed")
+        }
         Resolved::Simulate { .. } => Some("no results were saved"),
         Resolved::Observe { .. } => Some("no file was written"),
-        Resolved::Submit { .. } => Some("the job may have been accepted (see `osteon job list`)"),
-        Resolved::Prune { .. } => Some("jobs may have been deleted (see `osteon job list`)"),
-        Resolved::Watch { .. } => {
-            Some("the job continues (see `osteon job list`, `osteon job cancel`)")
-        }
-        Resolved::Recheck { .. } => Some("the job may be computed again (see `osteon job list`)"),
-        Resolved::Unban { .. } => Some("the ban may have been lifted (see `osteon workers`)"),
-        Resolved::Cancel { .. } => Some("the job may have been cancelled (see `osteon job list`)"),
-        Resolved::Fetch { .. } => Some("run the same command again to fetch the results"),
-        Resolved::DrainWorker { .. } => {
-            Some("the worker may have been told to drain (see `osteon workers`)")
-        }
-        Resolved::ScaleWorkers(_) => {
-            Some("workers that wait or run stay, and end when they have had no work for a while")
-        }
+        Resolved::Job { command, .. } => Some(jobs::left_by_interruption(command)),
+        Resolved::Workers { command, .. } => Some(match command {
+            None => "nothing was changed",
+            Some(WorkersOperation::Drain { .. }) => {
+                "the worker may have been told to drain (see `osteon workers`)"
+            }
+            Some(WorkersOperation::Unban { .. }) => {
+                "the ban may have been lifted (see `osteon workers`)"
+            }
+        }),
         Resolved::Backup { .. } => Some("no copy was kept"),
+        Resolved::Wing(command) => command.left_by_interruption(),
     }
 }
 
@@ -88,11 +73,9 @@ async fn perform(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
         Resolved::Simulate { arguments, isa } => simulate::simulate(arguments, isa).await,
         Resolved::Check { arguments, isa, cores } => check::check(arguments, isa, cores).await,
         Resolved::Draw(arguments) => draw::draw(&arguments),
-        Resolved::Report(arguments) => report::report(&arguments),
         Resolved::Observe { arguments, isa, threads } => {
             observe::observe(arguments, isa, threads).await
         }
-        Resolved::Umbridge(service) => umbridge::serve(*service).await,
         Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
         Resolved::Worker { config, files, unused, .. } => {
             worker::serve(config, &files, &unused).await
@@ -105,38 +88,20 @@ async fn perform(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
         Resolved::Doctor { patient, format } => doctor::examine(patient, format).await,
         Resolved::Completions(arguments) => man::completions(&arguments),
         Resolved::Man(arguments) => man::write(&arguments),
-        Resolved::Submit { job, kind, request, options, coordinator, format } => {
-            let submission = jobs::Submission { job: &job, kind, request: &request, options };
-            jobs::submit(submission, &coordinator, format).await
-        }
-        Resolved::Prune { older_than, keep_last, coordinator, format } => {
-            jobs::prune(older_than, keep_last, &coordinator, format).await
-        }
-        Resolved::Jobs { coordinator, format } => jobs::list(&coordinator, format).await,
-        Resolved::Watch { job, coordinator, format } => {
-            jobs::watch(&job, &coordinator, format).await
-        }
-        Resolved::Explain { job, coordinator, format } => {
-            jobs::explain(&job, &coordinator, format).await
-        }
-        Resolved::Recheck { job, coordinator, format } => {
-            jobs::recheck(&job, &coordinator, format).await
-        }
-        Resolved::Unban { host, coordinator } => operators::unban(&host, &coordinator).await,
-        Resolved::Cancel { job, coordinator } => jobs::cancel(&job, &coordinator).await,
-        Resolved::Fetch { job, coordinator, out } => jobs::fetch(&job, &coordinator, &out).await,
-        Resolved::Workers { coordinator, format } => operators::workers(&coordinator, format).await,
-        Resolved::DrainWorker { worker, coordinator, format } => {
-            operators::drain(worker, &coordinator, format).await
-        }
-        Resolved::ScaleWorkers(plan) => scaling::follow(*plan).await,
-        Resolved::JobScript(script) => slurm::job(&script),
-        Resolved::WorkerArray(array) => slurm::array(&array),
+        Resolved::Job { command, coordinator } => jobs::perform(command, &coordinator).await,
+        Resolved::Workers { command, coordinator, format } => match command {
+            None => operators::workers(&coordinator, format).await,
+            Some(WorkersOperation::Drain { worker }) => {
+                operators::drain(worker, &coordinator, format).await
+            }
+            Some(WorkersOperation::Unban { host }) => operators::unban(&host, &coordinator).await,
+        },
         Resolved::Health { coordinator, limit, format } => {
             operators::health(&coordinator, limit, format).await
         }
         Resolved::Backup { directory, coordinator, format } => {
             operators::backup(&directory, &coordinator, format).await
         }
+        Resolved::Wing(command) => command.perform().await,
     }
 }

@@ -1,21 +1,10 @@
-//! Estimates how long a job will take on this machine, before it is run.
-//!
-//! A few realizations are computed at the start and at points all over the box. Their times never
-//! reach a job or a result.
-
-mod measurement;
-mod places;
-
-use std::time::Duration;
+//! Says before a run that its job takes remarkably long.
 
 use osteon_common::job::JobSpecification;
-use osteon_common::parameters::Point;
-use osteon_search::ExpectedEvaluations;
+use osteon_local::cost::{Effort, JobCost};
 use osteon_solver::Isa;
 
 use crate::progress::{say, span};
-
-pub(crate) use self::measurement::Effort;
 
 /// Usual time of a realization, s.
 const USUAL_S: f64 = 0.25e-3;
@@ -26,140 +15,76 @@ const SHORT_S: f64 = 20.0;
 /// Jobs longer than this, s of wall time, are announced.
 const LONG_S: f64 = 300.0;
 
-/// Times of the realizations of one point.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct PlaceCost {
-    /// The point.
-    pub(crate) point: Point,
-    /// Mean time of a realization, s.
-    pub(crate) mean_s: f64,
-    /// Median time, s.
-    pub(crate) median_s: f64,
-    /// Number of realizations measured, at least one.
-    pub(crate) measured: usize,
-    /// Number of them that failed.
-    pub(crate) failed: usize,
-}
-
-/// The estimated cost of a job.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct JobCost {
-    /// Realizations at the start; `None` if not even one ended in time.
-    pub(crate) start: Option<PlaceCost>,
-    /// Those at points of the box; empty if no parameter is free.
-    pub(crate) places: Vec<PlaceCost>,
-    /// Number of points of the box at which none ended in time.
-    pub(crate) unmeasured: usize,
-    /// Longest time that was measured for, s.
-    pub(crate) limit_s: f64,
-    /// Number of evaluations that such a job usually takes.
-    pub(crate) expected: ExpectedEvaluations,
-    /// Number of realizations of each evaluation.
-    pub(crate) realizations: u64,
-    /// Number of threads on which the job would run.
-    pub(crate) cores: u32,
-}
-
-impl JobCost {
-    /// Estimates the cost of a job on this many cores.
-    pub(crate) async fn measure(
-        specification: &JobSpecification,
-        isa: Isa,
-        effort: Effort,
-        cores: u32,
-    ) -> Self {
-        let points = places::points(specification, effort.points);
-        let measured = measurement::measure(specification, isa, effort, points).await;
-        let mut places = measured.into_iter();
-        let start = places.next().flatten();
-        let (places, unmeasured) = places.fold((Vec::new(), 0), |(mut found, missing), place| {
-            let missing = missing + usize::from(place.is_none());
-            found.extend(place);
-            (found, missing)
-        });
-        Self {
-            start,
-            places,
-            unmeasured,
-            limit_s: effort.limit.as_secs_f64(),
-            expected: ExpectedEvaluations::from_specification(specification),
-            realizations: specification.monte_carlo.realizations,
-            cores,
-        }
-    }
-
-    /// Returns the median over the points of the box, s.
-    pub(crate) fn median_s(&self) -> Option<f64> {
-        measurement::median(self.places.iter().map(|place| place.mean_s))
-    }
-
-    /// Returns the point of the box whose realizations take longest.
-    pub(crate) fn worst(&self) -> Option<&PlaceCost> {
-        self.places.iter().max_by(|one, other| one.mean_s.total_cmp(&other.mean_s))
-    }
-
-    /// Returns the range of processor time, s; `None` if nothing was measured.
-    ///
-    /// A search leaves the start for points that are nearer to the middle of the box than most of it is:
-    /// most of a box of seven dimensions is corners, whose bones take several times as long as usual. The
-    /// range is from few evaluations like those at the start, or in the box if they are cheaper there, to
-    /// many between these two, in the geometric mean, or like those at the start.
-    pub(crate) fn processor_s(&self) -> Option<[f64; 2]> {
-        let start = self.start.as_ref()?.mean_s;
-        let median = self.median_s().unwrap_or(start);
-        let evaluation = |realization_s: f64| realization_s * self.realizations as f64;
-        Some([
-            evaluation(start.min(median)) * self.expected.fewest as f64,
-            evaluation(start.max((start * median).sqrt())) * self.expected.most as f64,
-        ])
-    }
-
-    /// Returns the range of wall time, s. More cores than realizations do not help.
-    pub(crate) fn wall_s(&self) -> Option<[f64; 2]> {
-        let rounds = self.realizations.div_ceil(u64::from(self.cores.max(1)));
-        let share = rounds as f64 / self.realizations.max(1) as f64;
-        Some(self.processor_s()?.map(|seconds| seconds * share))
-    }
-
-    /// Returns a sentence for the user who is about to run the job, if it takes remarkably long.
-    fn remark(&self) -> Option<String> {
-        let Some([_, most_s]) = self.wall_s() else {
-            return Some(format!(
-                "a realization takes more than {}, thousands of times as long as usual; see `osteon \
-                 check`",
-                span(self.limit_s)
-            ));
-        };
-        // The median: a thread that had to wait for its processor must not count.
-        let ratio = self.start.as_ref().map_or(0.0, |start| start.median_s) / USUAL_S;
-        if ratio > REMARKABLE_RATIO && most_s > SHORT_S {
-            return Some(format!(
-                "a realization takes some {:.0} ms, {ratio:.0} times as long as usual, and the job up to \
-                 about {}; see `osteon check`",
-                ratio * USUAL_S * 1e3,
-                span(most_s)
-            ));
-        }
-        let long = || format!("the job takes up to about {}; see `osteon check`", span(most_s));
-        (most_s > LONG_S).then(long)
-    }
-}
-
 /// Says so on stderr if a job that is about to be run on this machine takes remarkably long. This takes
 /// a few milliseconds if it does not.
 pub(crate) async fn say_if_remarkable(specification: &JobSpecification, isa: Isa, threads: u32) {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let cores = threads.min(u32::try_from(cores).unwrap_or(threads));
     let cost = JobCost::measure(specification, isa, Effort::BRIEF, cores).await;
-    if let Some(remark) = cost.remark() {
+    if let Some(remark) = remark(&cost) {
         say(&format!("note: {remark}"));
     }
 }
 
-/// Returns a limit of time.
-const fn milliseconds(count: u64) -> Duration {
-    Duration::from_millis(count)
+/// Returns a sentence for the user who is about to run the job, if it takes remarkably long.
+fn remark(cost: &JobCost) -> Option<String> {
+    let Some([_, most_s]) = cost.wall_s() else {
+        return Some(format!(
+            "a realization takes more than {}, thousands of times as long as usual; see `osteon \
+             check`",
+            span(cost.limit_s)
+        ));
+    };
+    // The median: a thread that had to wait for its processor must not count.
+    let ratio = cost.start.as_ref().map_or(0.0, |start| start.median_s) / USUAL_S;
+    if ratio > REMARKABLE_RATIO && most_s > SHORT_S {
+        return Some(format!(
+            "a realization takes some {:.0} ms, {ratio:.0} times as long as usual, and the job up to \
+             about {}; see `osteon check`",
+            ratio * USUAL_S * 1e3,
+            span(most_s)
+        ));
+    }
+    let long = || format!("the job takes up to about {}; see `osteon check`", span(most_s));
+    (most_s > LONG_S).then(long)
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use osteon_common::parameters::{PARAMETERS, Point};
+    use osteon_local::cost::PlaceCost;
+    use osteon_search::ExpectedEvaluations;
+
+    use super::*;
+
+    /// Costs with this time of a realization at the start, s.
+    fn cost(start_s: Option<f64>, realizations: u64) -> JobCost {
+        let point = Point([1.0; PARAMETERS]);
+        let place = |mean_s| PlaceCost { point, mean_s, median_s: mean_s, measured: 8, failed: 0 };
+        JobCost {
+            start: start_s.map(place),
+            places: Vec::new(),
+            unmeasured: 0,
+            limit_s: 2.0,
+            expected: ExpectedEvaluations { fewest: 50, most: 100 },
+            realizations,
+            cores: 2,
+        }
+    }
+
+    #[test]
+    fn only_what_takes_long_is_remarked() {
+        assert_eq!(remark(&cost(Some(0.25e-3), 200)), None);
+        // Slow realizations of a short job.
+        assert_eq!(remark(&cost(Some(1.9e-3), 200)), None);
+        assert_eq!(
+            remark(&cost(Some(25e-3), 200)).unwrap(),
+            "a realization takes some 25 ms, 100 times as long as usual, and the job up to about 4 min; \
+             see `osteon check`"
+        );
+        let many = remark(&cost(Some(0.25e-3), 1_000_000)).unwrap();
+        assert_eq!(many, "the job takes up to about 3.5 h; see `osteon check`");
+        let unknown = remark(&cost(None, 200)).unwrap();
+        assert!(unknown.starts_with("a realization takes more than 2.0 s"), "{unknown}");
+    }
+}

@@ -20,22 +20,20 @@ mod log_filter;
 mod logging;
 mod manual;
 mod new_files;
-mod observations;
 mod output;
+mod process_context;
 mod program;
 mod progress;
-mod report_directory;
 mod resolved;
 #[cfg(test)]
+#[path = "../client/src/sample_result.rs"]
 mod sample_result;
 mod signals;
-mod simulation_directory;
-mod slurm;
 mod telemetry;
-mod umbridge;
 mod unsearched_groups;
 mod user;
 mod warnings;
+mod wings;
 
 use std::process::ExitCode;
 

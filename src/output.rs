@@ -7,20 +7,18 @@ mod times;
 use std::io::{self, Write};
 use std::path::Path;
 
-use osteon_common::case::Setup;
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
-use osteon_common::sampling::NominalSampling;
-use osteon_files::report::{ResultFile, Solver};
+use osteon_files::report::ResultFile;
+use osteon_local::cost::JobCost;
+use osteon_local::observations::ObservationSummary;
+use osteon_local::simulation::SolvedCase;
 use osteon_proto::v1::{
     BackupEnd, BannedWorker, ExplainResponse, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
 };
-use osteon_solver::check::Check;
-use osteon_solver::{Arrival, Failure, FirstSignal, GuidedWaves, Isa};
+use osteon_solver::Isa;
 
-use crate::cost::JobCost;
 use crate::doctor::Diagnosis;
-use crate::observations::ObservationSummary;
 use crate::resolved::OutputFormat;
 
 pub(crate) use self::text::wrapped;
@@ -54,18 +52,10 @@ pub(crate) struct ShownResult<'a> {
 /// A simulation to show.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ShownSimulation<'a> {
-    /// The setup that was simulated.
-    pub(crate) setup: &'a Setup,
-    /// The picked arrival, or the failure.
-    pub(crate) arrival: &'a Result<Arrival, Failure>,
-    /// Other observables of the first signal, if there is an arrival.
-    pub(crate) first_signal: Option<&'a FirstSignal>,
-    /// The guided waves of the bone.
-    pub(crate) guided_waves: &'a GuidedWaves,
+    /// The case, solved.
+    pub(crate) solved: &'a SolvedCase,
     /// The file of the traces, if it was written.
     pub(crate) traces: Option<&'a Path>,
-    /// Comparison of other solutions of the same case, if requested.
-    pub(crate) check: Option<&'a Check>,
 }
 
 /// The estimated cost of a job to show.
@@ -88,20 +78,6 @@ pub(crate) struct ShownObservations<'a> {
     pub(crate) summary: &'a ObservationSummary,
     /// The file with a row for each, if it was written.
     pub(crate) file: Option<&'a Path>,
-}
-
-/// Returns the object `solver` of one solved case, with the sampling that was decisive, if known.
-fn solver_of(setup: &Setup, arrival: Option<&Arrival>) -> Solver<Option<f64>> {
-    let error = arrival.map(|arrival| arrival.estimated_error);
-    let mut solver = Solver::new(&setup.solver, NominalSampling::from_setup(setup), error);
-    if let (Some(used), Solver::Exact { band, period, pairs, pairs_computed, passes, .. }) =
-        (arrival.and_then(|arrival| arrival.passes), &mut solver)
-    {
-        (*band, *period) = (Some(used.last.band), Some(used.last.period));
-        (*pairs, *pairs_computed) = (Some(used.last.pairs), Some(used.pairs_computed));
-        *passes = Some(used.count);
-    }
-    solver
 }
 
 /// An output format. Every method writes whole lines.

@@ -1,39 +1,27 @@
 //! The command line with environment and defaults resolved; files have not been read yet.
 
-mod client;
-mod slurm;
-mod umbridge;
-
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::anyhow;
-use osteon_client::client::{Remote, SubmitOptions};
-use osteon_client::environment::{Environment, Unused};
-use osteon_client::request_id::RequestId;
+use osteon_client::client::Remote;
+use osteon_client::environment::Unused;
 use osteon_common::job::JobKind;
 use osteon_proto::credentials::{CredentialFiles, Credentials};
-use osteon_proto::endpoint::Endpoint;
 use osteon_solver::Isa;
 use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
-    Arguments, CertsArguments, CheckArguments, ClientArguments, Command, CompletionArguments,
-    CoordinatorArguments, CredentialArguments, DoctorArguments, DrawArguments, InitArguments,
-    JobFileArguments, LogFormat, ManArguments, MaterialsArguments, ObserveArguments,
-    ProgressFormat, ReportArguments, RunArguments, SchemaArguments, SimulateArguments,
-    TokenArguments, VerbosityArguments, WorkerArguments,
+    Arguments, BackupArguments, CertsArguments, CheckArguments, Command, CompletionArguments,
+    CoordinatorArguments, DoctorArguments, DrawArguments, HealthArguments, InitArguments,
+    JobCommand, JobFileArguments, LogFormat, ManArguments, MaterialsArguments, ObserveArguments,
+    ProgressFormat, RunArguments, SchemaArguments, SimulateArguments, TokenArguments,
+    VerbosityArguments, WorkerArguments, WorkersArguments, WorkersCommand,
 };
 use crate::doctor::Patient;
 use crate::exit_status::CommandFailure;
-use crate::slurm::job_script::JobScript;
-
-pub(crate) use slurm::{ScalingPlan, WorkerArray};
-pub(crate) use umbridge::ModelService;
-
-/// Default number of worker processes of a run on this machine.
-const WORKERS_DEFAULT: u32 = 2;
+use crate::process_context::{Locating, ProcessContext, RunLocation, WORKERS_DEFAULT};
+use crate::wings::{ReportOption, WingCommand};
 
 /// Format of the output on stdout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,8 +60,6 @@ pub(crate) enum Resolved {
     },
     /// `draw`.
     Draw(DrawArguments),
-    /// `report`.
-    Report(ReportArguments),
     /// `observe`.
     Observe {
         /// The job and the requested output.
@@ -83,8 +69,6 @@ pub(crate) enum Resolved {
         /// Number of threads.
         threads: u32,
     },
-    /// `umbridge`.
-    Umbridge(Box<ModelService>),
     /// `coordinator`.
     Coordinator(CoordinatorArguments),
     /// `worker`.
@@ -119,61 +103,22 @@ pub(crate) enum Resolved {
     Completions(CompletionArguments),
     /// `man`.
     Man(ManArguments),
-    /// `submit`.
-    Submit {
-        /// The job file.
-        job: JobFileArguments,
-        /// Kind of the job.
-        kind: JobKind,
-        /// The request, which makes the submission idempotent.
-        request: RequestId,
-        /// Further properties of the job.
-        options: SubmitOptions,
-        /// The coordinator to submit to.
-        coordinator: Remote,
-        /// Output format.
-        format: OutputFormat,
-    },
-    /// `jobs`.
-    Jobs {
+    /// A command about jobs.
+    Job {
+        /// The command.
+        command: JobCommand,
         /// The coordinator to ask.
         coordinator: Remote,
-        /// Output format.
-        format: OutputFormat,
-    },
-    /// `jobs prune`.
-    Prune {
-        /// Only jobs that ended longer ago than this.
-        older_than: Option<Duration>,
-        /// Number of most recently ended jobs that are kept.
-        keep_last: Option<u64>,
-        /// The coordinator to ask.
-        coordinator: Remote,
-        /// Output format.
-        format: OutputFormat,
     },
     /// `workers`.
     Workers {
+        /// The operation; without one they are listed.
+        command: Option<WorkersOperation>,
         /// The coordinator to ask.
         coordinator: Remote,
         /// Output format.
         format: OutputFormat,
     },
-    /// `workers drain`.
-    DrainWorker {
-        /// Number of the worker.
-        worker: u64,
-        /// The coordinator to ask.
-        coordinator: Remote,
-        /// Output format.
-        format: OutputFormat,
-    },
-    /// `workers slurm`.
-    ScaleWorkers(Box<ScalingPlan>),
-    /// `slurm script`.
-    JobScript(Box<JobScript>),
-    /// `slurm array`.
-    WorkerArray(Box<WorkerArray>),
     /// `health`.
     Health {
         /// The coordinator to ask.
@@ -192,55 +137,22 @@ pub(crate) enum Resolved {
         /// Output format.
         format: OutputFormat,
     },
-    /// `watch`.
-    Watch {
-        /// Id of the job.
-        job: String,
-        /// The coordinator to ask.
-        coordinator: Remote,
-        /// Output format.
-        format: OutputFormat,
+    /// A command of a wing.
+    Wing(Box<dyn WingCommand>),
+}
+
+/// An operation on workers.
+#[derive(Debug)]
+pub(crate) enum WorkersOperation {
+    /// Drain a worker.
+    Drain {
+        /// Its number.
+        worker: u64,
     },
-    /// `explain`.
-    Explain {
-        /// Id of the job.
-        job: String,
-        /// The coordinator to ask.
-        coordinator: Remote,
-        /// Output format.
-        format: OutputFormat,
-    },
-    /// `recheck`.
-    Recheck {
-        /// Id of the job.
-        job: String,
-        /// The coordinator.
-        coordinator: Remote,
-        /// Output format.
-        format: OutputFormat,
-    },
-    /// `workers unban`.
+    /// Lift the ban of a host.
     Unban {
-        /// The host.
+        /// Its name.
         host: String,
-        /// The coordinator.
-        coordinator: Remote,
-    },
-    /// `cancel`.
-    Cancel {
-        /// Id of the job.
-        job: String,
-        /// The coordinator to ask.
-        coordinator: Remote,
-    },
-    /// `fetch`.
-    Fetch {
-        /// Id of the job.
-        job: String,
-        /// The coordinator to ask.
-        coordinator: Remote,
-        /// Directory for the results.
-        out: PathBuf,
     },
 }
 
@@ -258,7 +170,7 @@ pub(crate) struct Run {
     /// Directory for the results, if they are kept.
     pub(crate) out: Option<PathBuf>,
     /// Whether a report is written beside them.
-    pub(crate) report: bool,
+    pub(crate) report: ReportOption,
     /// Address of its live page, if it has one.
     pub(crate) page: Option<SocketAddr>,
     /// Output format.
@@ -269,82 +181,59 @@ pub(crate) struct Run {
     pub(crate) verbosity: VerbosityArguments,
 }
 
-/// Where a job is computed.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum RunLocation {
-    /// Worker processes started by this process.
-    Local {
-        /// Number of worker processes.
-        workers: u32,
-        /// Number of threads of each worker.
-        threads: u32,
-    },
-    /// A running coordinator.
-    Coordinator(Remote),
-}
-
 impl Resolved {
     /// Resolves `arguments`.
     ///
     /// # Errors
     /// When the environment holds something that cannot be meant.
     pub(crate) fn from_arguments(arguments: Arguments) -> Result<Self, CommandFailure> {
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let cores = u32::try_from(cores).unwrap_or(1);
-        let environment = Environment::from_process()?;
-        let remote = |client: ClientArguments| {
-            let from_environment = client.coordinator.is_none();
-            let endpoint = environment.needed(client.coordinator)?;
-            let (files, unused) = environment.files(client.credentials.into(), &endpoint);
-            Ok::<_, CommandFailure>(Remote { endpoint, files, from_environment, unused })
-        };
-        let isa =
-            || Isa::chosen(std::env::var_os(Isa::VARIABLE)).map_err(CommandFailure::bad_input);
-        let run = |kind, run| {
-            let run = resolve_run(kind, run, cores, &environment)?;
-            // Workers read the variable again, but an invalid value is reported here, at once.
-            let isa = match run.location {
-                RunLocation::Local { .. } => Some(isa()?),
-                RunLocation::Coordinator(_) => None,
-            };
-            Ok::<_, CommandFailure>(Self::Run { run, isa })
-        };
+        let context = &ProcessContext::from_process()?;
+        let isa = ProcessContext::isa;
         Ok(match arguments.command {
-            Command::Identify(arguments) => run(JobKind::Identification, arguments)?,
-            Command::Propagate(arguments) => run(JobKind::Propagation, arguments)?,
+            Command::Identify(arguments) => {
+                run_command(JobKind::Identification, arguments, context)?
+            }
+            Command::Propagate(arguments) => run_command(JobKind::Propagation, arguments, context)?,
             Command::Simulate(arguments) => Self::Simulate { arguments, isa: isa()? },
-            Command::Check(arguments) => Self::Check { arguments, isa: isa()?, cores },
+            Command::Check(arguments) => {
+                Self::Check { arguments, isa: isa()?, cores: context.cores }
+            }
             Command::Draw(arguments) => Self::Draw(arguments),
-            Command::Report(arguments) => Self::Report(arguments),
             Command::Observe(arguments) => {
-                let threads = arguments.threads.unwrap_or(cores);
+                let threads = arguments.threads.unwrap_or(context.cores);
                 Self::Observe { arguments, isa: isa()?, threads }
             }
-            Command::Umbridge(arguments) => {
-                let service = umbridge::service(arguments, &environment, cores, isa()?)?;
-                Self::Umbridge(Box::new(service))
-            }
+            Command::JobWing(command) => Self::Wing(command.resolve(context)?),
             Command::Coordinator(arguments) => Self::Coordinator(arguments),
-            Command::Worker(arguments) => resolve_worker(arguments, &environment, cores, isa()?)?,
+            Command::Worker(arguments) => resolve_worker(arguments, context, isa()?)?,
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
             Command::Init(arguments) => Self::Init(arguments),
             Command::Schema(arguments) => Self::Schema(arguments),
             Command::Materials(arguments) => Self::Materials(arguments),
             Command::Doctor(DoctorArguments { store, client, json }) => {
-                let named = client.coordinator.is_some() || environment.coordinator()?.is_some();
-                let coordinator = named.then(|| remote(client)).transpose()?;
+                let named =
+                    client.coordinator.is_some() || context.environment.coordinator()?.is_some();
+                let coordinator = named.then(|| context.remote(client)).transpose()?;
                 let patient = Patient { store, coordinator, isa: isa()? };
                 Self::Doctor { patient, format: format(json) }
             }
             Command::Completions(arguments) => Self::Completions(arguments),
             Command::Man(arguments) => Self::Man(arguments),
-            Command::Job(command) => client::job(command, remote)?,
-            Command::Earlier(command) => client::job(command.into(), remote)?,
-            Command::Workers(arguments) => client::workers(arguments, remote)?,
-            Command::Slurm(arguments) => slurm::scripts(arguments, remote)?,
-            Command::Health(arguments) => client::health(arguments, remote)?,
-            Command::Backup(arguments) => client::backup(arguments, remote)?,
+            Command::Job(command) => job_command(command, context)?,
+            Command::Earlier(command) => job_command(command.into(), context)?,
+            Command::Workers(arguments) => resolve_workers(arguments, context)?,
+            Command::ClusterWing(command) => Self::Wing(command.resolve(context)?),
+            Command::Health(HealthArguments { client, timeout, json }) => Self::Health {
+                coordinator: context.remote(client)?,
+                limit: Duration::from_secs_f64(timeout),
+                format: format(json),
+            },
+            Command::Backup(BackupArguments { directory, client, json }) => Self::Backup {
+                directory,
+                coordinator: context.remote(client)?,
+                format: format(json),
+            },
         })
     }
 
@@ -360,7 +249,8 @@ impl Resolved {
     /// Returns the default log level: services log their events, commands only problems.
     pub(crate) fn default_log_level(&self) -> &'static str {
         match self {
-            Self::Coordinator(_) | Self::Worker { .. } | Self::ScaleWorkers(_) => "info",
+            Self::Coordinator(_) | Self::Worker { .. } => "info",
+            Self::Wing(command) => command.default_log_level(),
             _ => "warn",
         }
     }
@@ -371,90 +261,76 @@ pub(crate) fn format(json: bool) -> OutputFormat {
     if json { OutputFormat::Json } else { OutputFormat::Text }
 }
 
+fn run_command(
+    kind: JobKind,
+    arguments: RunArguments,
+    context: &ProcessContext,
+) -> Result<Resolved, CommandFailure> {
+    let run = resolve_run(kind, arguments, context)?;
+    // Workers read the variable again, but an invalid value is reported here, at once.
+    let isa = match run.location {
+        RunLocation::Local { .. } => Some(ProcessContext::isa()?),
+        RunLocation::Coordinator(_) => None,
+    };
+    Ok(Resolved::Run { run, isa })
+}
+
 fn resolve_run(
     kind: JobKind,
     arguments: RunArguments,
-    cores: u32,
-    environment: &Environment,
+    context: &ProcessContext,
 ) -> Result<Run, CommandFailure> {
-    let RunArguments {
-        job,
-        workers,
-        threads,
-        coordinator,
-        credentials,
-        name,
-        out,
-        report,
-        http,
-        json,
-        progress,
-        verbosity,
-    } = arguments;
-    let files = CredentialFiles::from(credentials);
+    let RunArguments { job, threads, coordinator, credentials, out, report, .. } = arguments;
+    let page = arguments.page.address();
     // A page of its own is one of a run on this machine.
-    let workers = workers.or(http.map(|_| WORKERS_DEFAULT));
-    let location =
-        Locating { workers, threads, coordinator, files }.location(cores, environment)?;
+    let workers = arguments.workers.or(page.map(|_| WORKERS_DEFAULT));
     Ok(Run {
         kind,
         job,
-        location,
-        name: name.unwrap_or_default(),
+        location: context.locate(Locating { workers, threads, coordinator, credentials })?,
+        name: arguments.name.unwrap_or_default(),
         out,
         report,
-        page: http,
-        format: format(json),
-        progress,
-        verbosity,
+        page,
+        format: format(arguments.json),
+        progress: arguments.progress,
+        verbosity: arguments.verbosity,
     })
 }
 
-/// The options that say where a job is computed.
-struct Locating {
-    workers: Option<u32>,
-    threads: Option<u32>,
-    coordinator: Option<Endpoint>,
-    files: CredentialFiles,
+fn job_command(command: JobCommand, context: &ProcessContext) -> Result<Resolved, CommandFailure> {
+    let coordinator = context.remote(command.client())?;
+    Ok(Resolved::Job { command, coordinator })
 }
 
-impl Locating {
-    fn location(
-        self,
-        cores: u32,
-        environment: &Environment,
-    ) -> Result<RunLocation, CommandFailure> {
-        let Self { workers, threads, coordinator, files } = self;
-        let local = workers.is_some() || threads.is_some();
-        let from_environment = coordinator.is_none();
-        let endpoint = match coordinator {
-            None if !local => environment.coordinator()?,
-            given => given,
-        };
-        match (endpoint, files.first_given()) {
-            (Some(endpoint), _) => {
-                let (files, unused) = environment.files(files, &endpoint);
-                let remote = Remote { endpoint, files, from_environment, unused };
-                Ok(RunLocation::Coordinator(remote))
-            }
-            (None, Some(option)) => Err(CommandFailure::bad_input(anyhow!(
-                "{option} requires a coordinator; add --coordinator URL"
-            ))),
-            (None, None) => {
-                let workers = workers.unwrap_or(WORKERS_DEFAULT);
-                let threads = threads.unwrap_or((cores / workers).max(1));
-                Ok(RunLocation::Local { workers, threads })
-            }
+fn resolve_workers(
+    arguments: WorkersArguments,
+    context: &ProcessContext,
+) -> Result<Resolved, CommandFailure> {
+    let WorkersArguments { command, client, json } = arguments;
+    let (command, client, json) = match command {
+        None => (None, client, json),
+        Some(WorkersCommand::Drain(drain)) => {
+            let operation = WorkersOperation::Drain { worker: drain.worker };
+            (Some(operation), drain.client.or(client), json || drain.json)
         }
-    }
+        Some(WorkersCommand::Unban(unban)) => {
+            (Some(WorkersOperation::Unban { host: unban.host }), unban.client.or(client), json)
+        }
+        Some(WorkersCommand::Wing(command)) => {
+            return Ok(Resolved::Wing(command.resolve(context, client)?));
+        }
+    };
+    let (coordinator, format) = (context.remote(client)?, format(json));
+    Ok(Resolved::Workers { command, coordinator, format })
 }
 
 fn resolve_worker(
     arguments: WorkerArguments,
-    environment: &Environment,
-    cores: u32,
+    context: &ProcessContext,
     isa: Isa,
 ) -> Result<Resolved, CommandFailure> {
+    let environment = &context.environment;
     let endpoint = environment.needed(arguments.coordinator)?;
     let (files, unused) = environment.files(arguments.credentials.into(), &endpoint);
     let config = WorkerConfig {
@@ -462,20 +338,13 @@ fn resolve_worker(
         endpoint,
         credentials: Credentials::default(),
         host: arguments.host.or_else(|| environment.host()),
-        threads: arguments.threads.unwrap_or(cores),
+        threads: arguments.threads.unwrap_or(context.cores),
         isa,
         give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),
         time_limit: arguments.time_limit.map(Duration::from_secs_f64),
         idle_timeout: arguments.idle_timeout.map(Duration::from_secs_f64),
     };
     Ok(Resolved::Worker { config, files, unused, log_format: arguments.log_format })
-}
-
-impl From<CredentialArguments> for CredentialFiles {
-    fn from(arguments: CredentialArguments) -> Self {
-        let CredentialArguments { tls_ca, tls_cert, tls_key, token_file } = arguments;
-        Self { ca: tls_ca, certificate: tls_cert, key: tls_key, token: token_file }
-    }
 }
 
 #[cfg(test)]

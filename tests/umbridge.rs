@@ -347,7 +347,7 @@ fn pages_of_a_browser_are_refused() {
 /// Beyond the connections that are served some wait for a place, and others are refused at once.
 #[test]
 fn a_crowd_waits_and_others_are_told_to_come_back() {
-    /// As many as src/umbridge/crowd.rs serves, and as many as it lets wait.
+    /// As many as umbridge/src/crowd.rs serves, and as many as it lets wait.
     const EACH: usize = 256;
     let scratch = Scratch::new();
     let job = scratch.write("job.toml", &propagation(10));

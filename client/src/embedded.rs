@@ -12,7 +12,7 @@ use anyhow::Context as _;
 use osteon_coordinator::store::Store;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
-use osteon_coordinator::{Config, Coordinator, ListenAddress};
+use osteon_coordinator::{Config, Coordinator, ListenAddress, Listener};
 use osteon_proto::endpoint::Endpoint;
 use tempfile::TempDir;
 
@@ -119,13 +119,11 @@ async fn start_coordinator(
     user: &dyn RunListener,
 ) -> Result<Coordinator, RunError> {
     let EmbeddedSetup { store, page, keep_ended, commit, .. } = setup;
-    let listener = osteon_coordinator::Listener::bind(&ListenAddress::Unix(socket), false).await;
+    let listener = Listener::bind(&ListenAddress::Unix(socket), false).await;
     let listener = listener.map_err(RunError::failed)?.with_spans(user.spans());
     let listener = match page {
         None => listener,
-        Some(page) => {
-            listener.with_page(page, false, Vec::new()).await.map_err(RunError::failed)?
-        }
+        Some(page) => with_page(listener, page).await?,
     };
     let store: Box<dyn Store + Send> = match store {
         StoreLocation::Memory => Box::new(MemoryStore::new()),
@@ -138,6 +136,17 @@ async fn start_coordinator(
     let store_give_up_after = Some(Duration::from_secs(STORE_PATIENCE_S));
     let config = Config { store_give_up_after, keep_ended, commit, ..Config::default() };
     osteon_coordinator::start(listener, store, config).await.map_err(RunError::failed)
+}
+
+/// Adds the live page.
+#[cfg(feature = "live")]
+async fn with_page(listener: Listener, page: SocketAddr) -> Result<Listener, RunError> {
+    listener.with_page(page, false, Vec::new()).await.map_err(RunError::failed)
+}
+
+#[cfg(not(feature = "live"))]
+async fn with_page(_: Listener, _: SocketAddr) -> Result<Listener, RunError> {
+    Err(RunError::BadInput(anyhow::anyhow!("this program was built without the live page")))
 }
 
 /// Creates a directory that only this user can enter.

@@ -29,12 +29,16 @@ pub mod embedded;
 pub mod environment;
 pub mod error;
 pub mod fetched;
+#[cfg(test)]
+mod fuzz;
 pub mod listener;
 pub mod operators;
 pub mod other_version;
 mod parts;
 mod peer;
 pub mod remote;
+#[cfg(feature = "report")]
+pub mod report_directory;
 pub mod request_id;
 pub mod result_files;
 pub mod result_status;
@@ -42,5 +46,5 @@ pub mod results_directory;
 pub mod run;
 pub mod run_error;
 #[cfg(test)]
-#[path = "../../src/sample_result.rs"]
 mod sample_result;
+pub mod simulation_directory;

@@ -3,8 +3,6 @@
 use std::fmt;
 
 use crate::ensemble::DISPERSION_MAX;
-use crate::limits::QUALITY_FACTOR_MIN;
-use crate::parameters::Parameter;
 
 /// An interval of finite numbers with its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,24 +68,8 @@ impl Interval {
         Self { lower: Edge::Closed(lower), upper: Edge::Closed(upper), unit }
     }
 
-    const fn at_least(lower: f64, unit: &'static str) -> Self {
+    pub(crate) const fn at_least(lower: f64, unit: &'static str) -> Self {
         Self { lower: Edge::Closed(lower), upper: Edge::None, unit }
-    }
-
-    /// Returns the values accepted for a parameter, regardless of other fields.
-    pub fn accepted_for(parameter: Parameter) -> Self {
-        match parameter {
-            Parameter::Density
-            | Parameter::LongitudinalYoungModulus
-            | Parameter::LongitudinalShearModulus
-            | Parameter::TransverseYoungModulus
-            | Parameter::BoneThickness
-            | Parameter::CouplingSoundSpeed => Self::above(0.0, parameter.unit()),
-            Parameter::BoneQualityFactor => Self::at_least(QUALITY_FACTOR_MIN, ""),
-            Parameter::LongitudinalPoissonRatio => Self::finite(""),
-            Parameter::TransversePoissonRatio => Self::between(-1.0, 1.0, ""),
-            Parameter::Dispersion => Self::between(0.0, DISPERSION_MAX, "that is √(7/11)"),
-        }
     }
 
     /// Returns the unit, or what the numbers are fractions of; empty for pure numbers.
@@ -243,7 +225,7 @@ mod tests {
                 "from 1.2e10 to 2.5e10 (the bounds)",
             ),
             (
-                Interval::accepted_for(Parameter::Dispersion),
+                Interval::between(0.0, DISPERSION_MAX, "that is √(7/11)"),
                 [0.1, DISPERSION_MAX.next_down()],
                 [0.0, DISPERSION_MAX],
                 "above 0 and below 0.79772… (that is √(7/11))",
@@ -252,15 +234,6 @@ mod tests {
             assert!(inside.iter().all(|&value| interval.contains(value)), "{said}");
             assert!(outside.iter().all(|&value| !interval.contains(value)), "{said}");
             assert_eq!(interval.to_string(), said);
-        }
-    }
-
-    #[test]
-    fn every_parameter_refuses_what_is_not_finite() {
-        for parameter in Parameter::ALL {
-            for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-                assert!(!Interval::accepted_for(parameter).contains(value), "{}", parameter.name());
-            }
         }
     }
 }

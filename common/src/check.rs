@@ -4,9 +4,9 @@
 //! to be wrong is not checked again, nor is a relation between fields of which one is wrong.
 
 mod data;
-mod decays;
 mod job;
 mod known_quantities;
+mod observables;
 mod posterior;
 mod priors;
 mod random_quantities;
@@ -20,7 +20,6 @@ use crate::job::JobSpecification;
 use crate::violations::Violations;
 
 pub use self::data::{COUNT, DATA_FORMS, REPEATABILITY, VELOCITIES_MIN, VELOCITY, data, no_data};
-pub use self::decays::DECAY;
 pub use self::job::{job, job_from};
 pub use self::posterior::posterior;
 pub use self::random_quantities::random_quantities;

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::moments::Moments;
+use crate::observables::ObservableMeans;
 use crate::parameters::{Parameter, Point};
 use crate::posterior::Posterior;
 
@@ -14,7 +15,7 @@ pub struct Conclusions {
     /// Identified quantities; `None` if the derivatives were not measured, or cannot be computed.
     pub inference: Option<Inference>,
     /// Profiles of the cost, one for each free parameter; empty for a likelihood, and if there are
-    /// priors or decays.
+    /// priors or other observables.
     pub profiles: Vec<Profile>,
     /// The solutions from all starts; `None` for a single start.
     pub solutions: Option<Solutions>,
@@ -51,8 +52,8 @@ pub struct Inference {
 /// A direction of the box that the data determine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Direction {
-    /// Singular value: change of ln v, ln Δ and, if decays were measured, of their mean relative to that
-    /// of the data, together, for a step across the box.
+    /// Singular value: change of ln v, ln Δ and, of the observables that were measured, of their means
+    /// relative to those of the data, together, for a step across the box.
     pub singular_value: f64,
     /// Unit vector with a component for each free parameter, in units of the box.
     pub components: Vec<f64>,
@@ -88,8 +89,8 @@ pub struct Sensitivity {
     pub mean: f64,
     /// The same for the coefficient of variation, ∂ ln Δ / ∂ ln p.
     pub coefficient_of_variation: f64,
-    /// The same for the mean decay, relative to that of the data; `None` if no decays were measured.
-    pub decay: Option<f64>,
+    /// The same for the means of the measured observables, relative to those of the data.
+    pub observables: ObservableMeans,
 }
 
 /// Relative standard errors of both moments.

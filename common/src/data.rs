@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 use crate::known_quantities::KnownQuantities;
+use crate::observables::{ObservableSet, ObservedColumns, PerObservable};
 
 /// The measured velocities, or their moments, with the instrument's own scatter.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,8 +27,8 @@ pub enum Measurements {
         velocities: Vec<f64>,
         /// Subject of each velocity, as for [`Group::subjects`].
         subjects: Option<Vec<u32>>,
-        /// Decay measured with each velocity, as for [`Group::decays`].
-        decays: Option<Vec<f64>>,
+        /// Observables measured with each velocity, as for [`Group::observables`].
+        observables: ObservedColumns,
     },
     /// Several sets of velocities. Each group is identified separately, in this order; at least one
     /// of them has two different velocities.
@@ -54,9 +55,9 @@ pub struct Group {
     /// Subject of each velocity, from 0, numbered by [`numbered`]: velocities of one subject are
     /// not independent. `None` if all velocities are independent.
     pub subjects: Option<Vec<u32>>,
-    /// Decay along the array that was measured with each velocity, dB/cm; of all groups of a job, or
-    /// of none.
-    pub decays: Option<Vec<f64>>,
+    /// Values of other observables that were measured with each velocity; the same observables of all
+    /// groups of a job.
+    pub observables: ObservedColumns,
     /// Quantities of the setup that are known of this group; the same ones of all groups of a job.
     pub known: KnownQuantities,
 }
@@ -68,8 +69,8 @@ pub struct VelocitySet<'a> {
     pub velocities: &'a [f64],
     /// Subject of each velocity, as for [`Group::subjects`].
     pub subjects: Option<&'a [u32]>,
-    /// Decay measured with each velocity, as for [`Group::decays`].
-    pub decays: Option<&'a [f64]>,
+    /// Observables measured with each velocity, as for [`Group::observables`].
+    pub observables: PerObservable<Option<&'a [f64]>>,
     /// The instrument's own standard deviation, m/s.
     pub repeatability: f64,
 }
@@ -106,8 +107,8 @@ pub fn numbered<T: Ord>(names: impl IntoIterator<Item = T>) -> Vec<u32> {
 impl Group {
     /// Creates a group of independent velocities, m/s.
     pub fn new(name: impl Into<String>, velocities: Vec<f64>) -> Self {
-        let known = KnownQuantities::default();
-        Self { name: name.into(), velocities, subjects: None, decays: None, known }
+        let (observables, known) = (ObservedColumns::default(), KnownQuantities::default());
+        Self { name: name.into(), velocities, subjects: None, observables, known }
     }
 
     /// Returns the reason why this group cannot be searched; `None` if it can.
@@ -124,8 +125,9 @@ impl Group {
 
 impl Data {
     /// Creates data of one set of independent velocities, m/s.
-    pub const fn from_velocities(velocities: Vec<f64>) -> Self {
-        Self::exact(Measurements::Velocities { velocities, subjects: None, decays: None })
+    pub fn from_velocities(velocities: Vec<f64>) -> Self {
+        let observables = ObservedColumns::default();
+        Self::exact(Measurements::Velocities { velocities, subjects: None, observables })
     }
 
     /// Creates data of several sets of velocities.
@@ -192,18 +194,19 @@ impl Data {
 
     /// Returns a set of velocities, by its number; `None` if only the moments are known.
     pub fn set(&self, set: usize) -> Option<VelocitySet<'_>> {
-        let (velocities, subjects, decays) = match &self.measurements {
-            Measurements::Velocities { velocities, subjects, decays } => {
-                (velocities, subjects, decays)
+        let (velocities, subjects, observables) = match &self.measurements {
+            Measurements::Velocities { velocities, subjects, observables } => {
+                (velocities, subjects, observables)
             }
             Measurements::Groups(groups) => {
                 let group = groups.get(set)?;
-                (&group.velocities, &group.subjects, &group.decays)
+                (&group.velocities, &group.subjects, &group.observables)
             }
             Measurements::Moments { .. } => return None,
         };
-        let (subjects, decays) = (subjects.as_deref(), decays.as_deref());
-        Some(VelocitySet { velocities, subjects, decays, repeatability: self.repeatability })
+        let observables = observables.as_ref().map(Option::as_deref);
+        let (subjects, repeatability) = (subjects.as_deref(), self.repeatability);
+        Some(VelocitySet { velocities, subjects, observables, repeatability })
     }
 
     /// Returns the velocities of a set, by its number; `None` if only their moments are known.
@@ -217,9 +220,9 @@ impl Data {
         self.set(set)?.subjects
     }
 
-    /// Returns whether decays were measured.
-    pub fn has_decays(&self) -> bool {
-        self.set(0).is_some_and(|set| set.decays.is_some())
+    /// Returns the observables that were measured.
+    pub fn observables(&self) -> ObservableSet {
+        self.set(0).map(|set| set.observables.set()).unwrap_or_default()
     }
 
     /// Returns the instrument's own standard deviation, m/s; 0 if it is not known.
@@ -239,7 +242,8 @@ impl Data {
 impl<'a> VelocitySet<'a> {
     /// Creates a set of independent velocities, m/s, without scatter of the instrument.
     pub fn independent(velocities: &'a [f64]) -> Self {
-        Self { velocities, subjects: None, decays: None, repeatability: 0.0 }
+        let observables = PerObservable::default();
+        Self { velocities, subjects: None, observables, repeatability: 0.0 }
     }
 
     /// Returns the number of independent parts: of subjects, or else of velocities.

@@ -10,7 +10,7 @@ use crate::job::Data;
 use crate::limits;
 use crate::results::DataSummary;
 use crate::robust::outliers;
-use crate::statistics::measured_decay;
+use crate::statistics::measured_observables;
 
 pub use self::few::{FewIntervals, intervals_of_data};
 pub use self::intervals::{intervals_of_moments, moment_intervals};
@@ -28,7 +28,7 @@ impl DataSummary {
         let outliers = given.map(|given| outliers(given.velocities)).unwrap_or_default();
         Self {
             moments: data.moments(set),
-            decay: given.as_ref().and_then(measured_decay),
+            observables: given.as_ref().map(measured_observables).unwrap_or_default(),
             count: given.map(|given| given.velocities.len() as u64),
             intervals: match &given {
                 Some(given) => moment_intervals(given),

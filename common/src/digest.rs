@@ -8,8 +8,8 @@ use crate::parameters::Point;
 ///
 /// Each evaluation adds its parameters (seven, and those of the setup that are searched), then for
 /// each index the code byte of the outcome (0 = success) and its velocity in m/s (0 on failure); then,
-/// if the job has measured decays, for each index the decay in dB/cm (0 on failure); every float as 8
-/// bytes little-endian, nothing between them. The digest depends on these numbers alone: not
+/// for each observable that the job has data of, in their order, its value for each index (0 on failure);
+/// every float as 8 bytes little-endian, nothing between them. The digest depends on these numbers alone: not
 /// on names, times or the program's version.
 #[derive(Debug, Clone, Default)]
 pub struct PathDigest(blake3::Hasher);
@@ -25,16 +25,18 @@ impl PathDigest {
         Self::default()
     }
 
-    /// Appends one evaluation: its point and its outcomes in index order, with the decays that they
+    /// Appends one evaluation: its point and its outcomes in index order, with the observables that they
     /// have.
     pub fn add(&mut self, point: &Point, outcomes: &Outcomes) {
         self.add_evaluation(point, outcomes);
-        for decay in outcomes.decays().into_iter().flatten() {
-            self.0.update(&decay.to_le_bytes());
+        for (_, values) in outcomes.observables().present() {
+            for value in values.iter() {
+                self.0.update(&value.to_le_bytes());
+            }
         }
     }
 
-    /// Appends one evaluation without decays: its point and its outcomes in index order.
+    /// Appends one evaluation without other observables: its point and its outcomes in index order.
     pub fn add_evaluation(&mut self, point: &Point, outcomes: &[Outcome]) {
         for (_, value) in point.given() {
             self.0.update(&value.to_le_bytes());
@@ -62,6 +64,7 @@ impl PathDigest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::observables::{Observable, PerObservable};
     use crate::outcome::FailureKind;
 
     const FIRST: Point =
@@ -87,11 +90,13 @@ mod tests {
     }
 
     #[test]
-    fn decays_follow_the_outcomes() {
+    fn observables_follow_the_outcomes() {
         let of = |decays: Option<[f64; 3]>| {
             let mut digest = PathDigest::new();
             let outcomes = Outcomes::from(FIRST_OUTCOMES);
-            digest.add(&FIRST, &outcomes.with_decays(decays.map(|decays| decays.to_vec())));
+            let mut columns = PerObservable::default();
+            columns[Observable::Decay] = decays.map(|decays| decays.to_vec());
+            digest.add(&FIRST, &outcomes.with_observables(columns));
             digest.finish()
         };
         let mut digest = PathDigest::new();

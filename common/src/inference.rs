@@ -1,8 +1,8 @@
 //! Inference from the data: which parameters they determine and which they leave free, to first
 //! order around the best point.
 //!
-//! y = (ln v, ln Δ), the logarithms of mean and coefficient of variation of the velocities, depend
-//! on the free parameters x, in units of the box, through the Jacobian J that the search has
+//! y, the logarithms of mean and coefficient of variation of the velocities and the means of other
+//! observables relative to those of the data, depends on the free parameters x, in units of the box, through the Jacobian J that the search has
 //! measured by differences on common germs. A small error e of the data's or the model's moments
 //! moves the solution by J⁺ e, where J⁺ is the pseudo-inverse; nothing is known about its position
 //! along the null space of J. With the covariance C of e, a quantity with the gradient g has the
@@ -21,7 +21,6 @@
 
 mod agreement;
 mod conclusions;
-mod decay;
 mod jacobian;
 mod linear;
 mod noise;
@@ -33,23 +32,23 @@ mod tests;
 mod weights;
 
 use crate::job::{JobSpecification, Objective};
-use crate::moments::log_ratios;
+use crate::moments::{ComparedMoments, MomentMatrix};
 use crate::results::{BestPoint, Evaluation};
 use crate::statistics::{LikelihoodFit, likelihood_fit};
 
 use self::linear::Linear;
-use self::quantities::{AllNoise, LogarithmicEnds, Quantities};
+use self::quantities::{LogarithmicEnds, Quantities};
 
+use self::agreement::compared;
 pub use self::agreement::{Agreement, agreement};
-use self::agreement::{compared, off_decay};
 pub use self::conclusions::{below_noise_from, meaning};
-pub use self::decay::{DECAY_PARTS_MIN, DecayWeights};
 pub use self::jacobian::{Jacobian, jacobian};
-pub use self::noise::{DataNoise, Noise, data_noise, noise};
+use self::noise::of_velocities;
+pub use self::noise::{DataNoise, Noise, data_noise, model_errors, noise};
 pub(crate) use self::noise::{PARTS_MIN, student_quantile};
 pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
-pub use self::weights::MomentWeights;
+pub use self::weights::{MomentWeights, OBSERVED_PARTS_MIN};
 pub use crate::conclusions::{
     Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors, Profile, Sensitivity,
     Solution, Solutions, Spread, Spreads, Uncertainty,
@@ -68,27 +67,36 @@ pub fn inference(
     let estimate = best.velocity?;
     let data = specification.data.as_ref()?;
     let jacobian = jacobian(specification, set, best, history)?;
-    let weights = if jacobian.has_decays { DecayWeights::of_data(data, set) } else { None };
+    let is_weighted =
+        !jacobian.observables.is_empty() && specification.objective != Objective::Moments;
+    let weights = if is_weighted { MomentWeights::of_data(data, set) } else { None };
     let linear = Linear::from_jacobian(&jacobian, weights.as_ref());
-    let likely = by_likelihood(specification, set, best);
-    let ends = if likely.is_none() { LogarithmicEnds::of_data(data, set) } else { None };
-    let of_moments = noise(data, set, &estimate);
-    let (noise, residual) = match likely {
-        Some((of_data, residual)) => (Noise { data: Some(of_data), ..of_moments }, residual),
-        None => (of_moments, log_ratios(data.moments(set), estimate.moments)),
-    };
+    let model = ComparedMoments::of_estimates(&estimate, &best.observables);
+    let mut residual = model.differences(&data.compared(set)).map(|difference| -difference);
+    let mut noise = noise(data, set, &estimate, &best.observables);
+    let mut ends = LogarithmicEnds::of_data(data, set);
+    if let Some(LikelihoodFit { residual: likely, covariance }) =
+        by_likelihood(specification, set, best)
+    {
+        residual[..2].copy_from_slice(&likely);
+        let covariance = match noise.data {
+            Some(found) => with_block(found.covariance, covariance),
+            None => of_velocities(covariance),
+        };
+        let freedom = data.set(set).map_or(1, |given| given.parts() as u64 - 1);
+        noise.data = Some(DataNoise { covariance, freedom });
+        ends = None;
+    }
     let quantile = noise.quantile();
-    let off = best.decay.and_then(|decay| off_decay(data, set, &decay));
     let Agreement { matched, held, .. } =
-        compared(specification, set, &best.point, (residual, off), &noise);
-    let all = AllNoise::new(&noise, weights.as_ref(), best.decay.as_ref());
+        compared(specification, set, &best.point, residual, &noise);
     let context = Quantities {
         specification,
         best,
         linear: &linear,
-        noise: &all,
+        noise: &noise,
         quantile,
-        residual: [residual[0], residual[1], off.map_or(0.0, |[difference, _]| difference)],
+        residual,
         ends,
         known: matched && !held && linear.undetermined.is_empty() && is_enough(&noise),
     };
@@ -111,21 +119,31 @@ fn is_enough(noise: &Noise) -> bool {
     noise.data.is_some_and(|data| data.freedom + 1 >= PARTS_MIN)
 }
 
-/// Returns noise and residual of the moments by which the velocities are most likely, if a likelihood
-/// was maximised; `None` if it was not, or has no maximum.
+/// Returns residual and covariance of the moments of the velocities by which these are most likely, if a
+/// likelihood was maximised; `None` if it was not, or has no maximum.
 fn by_likelihood(
     specification: &JobSpecification,
     set: usize,
     best: &BestPoint,
-) -> Option<(DataNoise, [f64; 2])> {
+) -> Option<LikelihoodFit> {
     if specification.objective != Objective::Likelihood {
         return None;
     }
     let velocities = specification.data.as_ref()?.set(set)?;
     let monte_carlo = &specification.monte_carlo;
-    let LikelihoodFit { residual, covariance } =
-        likelihood_fit(monte_carlo, &best.point, &best.outcomes, &velocities)?;
-    Some((DataNoise { covariance, freedom: velocities.parts() as u64 - 1 }, residual))
+    likelihood_fit(monte_carlo, &best.point, &best.outcomes, &velocities)
+}
+
+/// Returns a covariance with another one of the moments of the velocities. The covariances with the
+/// observables change with it, so that their correlations stay.
+fn with_block(mut covariance: MomentMatrix, block: [[f64; 2]; 2]) -> MomentMatrix {
+    for (axis, row) in block.into_iter().enumerate() {
+        let factor = (row[axis] / covariance[axis][axis]).sqrt();
+        covariance[axis][2..].iter_mut().for_each(|with_other| *with_other *= factor);
+        covariance[2..].iter_mut().for_each(|row_of_other| row_of_other[axis] *= factor);
+        covariance[axis][..2].copy_from_slice(&row);
+    }
+    covariance
 }
 
 /// Returns the number of the first evaluation of a search from which on its lowest cost was below
@@ -134,13 +152,14 @@ fn by_likelihood(
 pub fn first_below_noise(
     set: usize,
     best: &BestPoint,
+    data: &ComparedMoments,
     weights: Option<&MomentWeights>,
     history: &[Evaluation],
 ) -> Option<u64> {
-    let relative = best.velocity?.relative_errors();
+    let errors = model_errors(data, &best.velocity?, &best.observables);
     let cost = match weights {
-        Some(weights) => weights.of_errors(relative),
-        None => relative[0] * relative[0] + relative[1] * relative[1],
+        Some(weights) => weights.of_errors(errors),
+        None => errors.iter().map(|error| error * error).sum(),
     };
     let searched = history.iter().filter(|row| row.belongs_to(set) && row.role.is_of_search());
     let mut below = searched.filter(|row| row.cost.is_some_and(|found| found <= cost));

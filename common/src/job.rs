@@ -3,6 +3,8 @@
 use crate::case::Setup;
 use crate::fields::{Key, Section};
 use crate::inference::data_noise;
+use crate::moments::MomentMatrix;
+use crate::observables::ObservableSet;
 use crate::parameters::{self, AS_IN_SETUP, BONE_PARAMETERS, PARAMETERS, Parameter, Point};
 use crate::random_quantities::RandomQuantities;
 use crate::realization::{Ensemble, PointError};
@@ -166,7 +168,7 @@ pub struct Omitted {
 
 /// Returns whether the noise of all data that are searched is known.
 fn has_known_noise(data: &Data) -> bool {
-    let is_known = |[[mean, _], [_, variation]]: [[f64; 2]; 2]| mean > 0.0 && variation > 0.0;
+    let is_known = |covariance: MomentMatrix| covariance[0][0] > 0.0 && covariance[1][1] > 0.0;
     let found = |set| data_noise(data, set).is_some_and(|noise| is_known(noise.covariance));
     data.searched_sets().all(found)
 }
@@ -178,9 +180,9 @@ impl JobSpecification {
         RunSettings { random, monte_carlo, objective, search }
     }
 
-    /// Returns whether decays were measured, so that each realization's decay is a part of the job.
-    pub fn has_decays(&self) -> bool {
-        self.data.as_ref().is_some_and(Data::has_decays)
+    /// Returns the observables that were measured, and that each realization must have therefore.
+    pub fn observables(&self) -> ObservableSet {
+        self.data.as_ref().map(Data::observables).unwrap_or_default()
     }
 
     /// Returns the range of one parameter.

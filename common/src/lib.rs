@@ -36,6 +36,7 @@ pub mod layers;
 pub mod limits;
 pub mod moments;
 mod monte_carlo;
+pub mod observables;
 pub mod origin;
 pub mod outcome;
 pub mod outcomes;

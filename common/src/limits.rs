@@ -86,8 +86,8 @@ pub const ACTIVE_REALIZATIONS_MAX: u64 = 2 * REALIZATIONS_MAX;
 pub const ACTIVE_JOBS_MAX: usize = 8;
 /// Longest name or id in a request, bytes.
 pub const NAME_BYTES_MAX: usize = 256;
-/// Longest message from a worker, bytes; the largest answer to a batch takes 1.1 MB, or 1.6 MB with
-/// decays.
+/// Longest message from a worker, bytes; the largest answer to a batch takes 1.1 MB, and 0.5 MB
+/// more for each observable.
 pub const WORKER_MESSAGE_BYTES_MAX: usize = 4 << 20;
 /// Longest file of certificates, keys or tokens, bytes.
 pub const CREDENTIAL_FILE_BYTES_MAX: u64 = 4 << 20;

@@ -1,7 +1,18 @@
-//! Moments of velocities, their errors and tests, as plain data.
+//! Moments of velocities, means of other observables, their errors and tests, as plain data.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::observables::{OBSERVABLES, Observable, ObservableMeans, PerObservable};
+
+/// Number of the moments in which a model and data are compared.
+pub const MOMENTS: usize = 2 + OBSERVABLES;
+/// Differences of the compared moments, or other values of each: of ln v and ln Δ, and of the mean of each
+/// observable relative to that of the data, in the order of [`Observable::ALL`]. 0 for an observable
+/// that was not measured.
+pub type MomentVector = [f64; MOMENTS];
+/// A value for each pair of the compared moments.
+pub type MomentMatrix = [[f64; MOMENTS]; MOMENTS];
 
 /// Mean and coefficient of variation of a set of velocities (the paper's Secs. 2 and 5).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,6 +26,64 @@ pub struct Moments {
 impl Moments {
     /// Moments that are not known.
     pub const UNKNOWN: Self = Self { mean: f64::NAN, coefficient_of_variation: f64::NAN };
+}
+
+/// The moments in which a model and data are compared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ComparedMoments {
+    /// Those of the velocities.
+    pub velocities: Moments,
+    /// Means of the other observables; of a model those that were measured, or all that are known.
+    pub observables: ObservableMeans,
+}
+
+impl ComparedMoments {
+    /// Moments that are not known.
+    pub const UNKNOWN: Self =
+        Self { velocities: Moments::UNKNOWN, observables: PerObservable([None; OBSERVABLES]) };
+
+    /// Returns those of a model, given the estimates of them.
+    pub fn of_estimates(velocities: &Estimate, observables: &ObservableEstimates) -> Self {
+        let observables = observables.map(|found| found.map(|found| found.mean));
+        Self { velocities: velocities.moments, observables }
+    }
+
+    /// Returns ln v, ln Δ, and of each observable of the data the mean relative to that, less 1; NaN where
+    /// the model's is not known.
+    pub fn in_logarithms(&self, data: &Self) -> MomentVector {
+        let Moments { mean, coefficient_of_variation } = self.velocities;
+        let [_, _, observables @ ..] = self.differences(data);
+        let logarithms = [mean, coefficient_of_variation].map(libm::log);
+        moment_vector(logarithms, |one| observables[one as usize])
+    }
+
+    /// Returns the differences from the moments of data, in the observables that these have; NaN where
+    /// the model's are not known.
+    pub fn differences(&self, data: &Self) -> MomentVector {
+        let [mean, variation] = log_ratios(self.velocities, data.velocities);
+        moment_vector([mean, variation], |one| match data.observables[one] {
+            Some(measured) => (self.observables[one].unwrap_or(f64::NAN) - measured) / measured,
+            None => 0.0,
+        })
+    }
+}
+
+/// Without other observables.
+impl From<Moments> for ComparedMoments {
+    fn from(velocities: Moments) -> Self {
+        Self { velocities, ..Self::UNKNOWN }
+    }
+}
+
+/// Returns the values for the moments of the velocities, and those of the observables by a function.
+pub(crate) fn moment_vector(
+    of_velocities: [f64; 2],
+    of_observable: impl Fn(Observable) -> f64,
+) -> MomentVector {
+    std::array::from_fn(|axis| match axis.checked_sub(2) {
+        Some(observable) => of_observable(Observable::ALL[observable]),
+        None => of_velocities[axis],
+    })
 }
 
 /// Returns the logarithms of the ratios of both moments to those of `base`.
@@ -47,16 +116,19 @@ impl Estimate {
     }
 }
 
-/// Mean and scatter of decays along the array, with the error of the mean.
+/// Mean and scatter of an observable, with the error of the mean, in its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct DecayEstimate {
-    /// Mean, dB/cm.
+pub struct ObservableEstimate {
+    /// Mean.
     pub mean: f64,
-    /// Standard deviation of the decays, with division by their number, dB/cm.
+    /// Standard deviation of the values, with division by their number.
     pub standard_deviation: f64,
-    /// Standard error of the mean, dB/cm.
+    /// Standard error of the mean.
     pub standard_error: f64,
 }
+
+/// Estimates of those observables that are known.
+pub type ObservableEstimates = PerObservable<Option<ObservableEstimate>>;
 
 /// Estimated relative errors, by discretisation, of the velocities of a set of realizations.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::observables::{Observable, ObservableSet, ObservedValues};
+
 /// Reason why a realization has no velocity. The discriminant is the byte that encodes the failure
 /// in the digest, on the wire and in the store, where 0 encodes success. Codes are never reused.
 #[derive(
@@ -83,14 +85,20 @@ pub struct RealizationResult {
     pub outcome: Outcome,
     /// Estimated relative error of the velocity due to discretisation, ≥ 0; 0 on failure.
     pub estimated_error: f64,
-    /// Decay along the array, dB/cm, finite; 0 on failure, and for a job without measured decays.
-    pub decay: f64,
+    /// Other observables, finite; 0 on failure, and where the job has no data of one.
+    pub observables: ObservedValues,
 }
 
 impl RealizationResult {
-    /// Returns a realization without a velocity.
+    /// Creates a realization with a velocity (m/s), with the estimated relative error of that, and without
+    /// other observables.
+    pub const fn solved(velocity: f64, estimated_error: f64) -> Self {
+        Self { outcome: Ok(velocity), estimated_error, observables: ObservedValues::NONE }
+    }
+
+    /// Creates a realization without a velocity.
     pub fn failed(kind: FailureKind) -> Self {
-        Self { outcome: Err(kind), estimated_error: 0.0, decay: 0.0 }
+        Self { outcome: Err(kind), estimated_error: 0.0, observables: ObservedValues::NONE }
     }
 
     /// Returns whether the estimated error is valid: finite and not negative for a velocity, exactly 0
@@ -102,17 +110,27 @@ impl RealizationResult {
         }
     }
 
-    /// Returns whether the decay is valid: finite for a velocity, exactly 0 for a failure.
-    pub fn has_valid_decay(&self) -> bool {
-        match self.outcome {
-            Ok(_) => self.decay.is_finite(),
-            Err(_) => self.decay.to_bits() == 0,
-        }
+    /// Returns the first observable whose value is not valid: it must be finite for a velocity, exactly 0
+    /// for a failure.
+    pub fn invalid_observable(&self) -> Option<Observable> {
+        let is_valid = |value: f64| match self.outcome {
+            Ok(_) => value.is_finite(),
+            Err(_) => value.to_bits() == 0,
+        };
+        let mut invalid = self.observables.iter().filter(|(_, value)| !is_valid(**value));
+        invalid.next().map(|(observable, _)| observable)
     }
 
-    /// Returns whether estimated error and decay are valid.
+    /// Returns whether it has a velocity and lacks one of these observables, as from a program that does
+    /// not know it: no observable is exactly 0.
+    pub fn lacks_one(&self, wanted: ObservableSet) -> bool {
+        let lacks = |one: Observable| self.observables[one].to_bits() == 0;
+        self.outcome.is_ok() && wanted.members().any(lacks)
+    }
+
+    /// Returns whether estimated error and observables are valid.
     pub fn is_consistent(&self) -> bool {
-        self.has_valid_error() && self.has_valid_decay()
+        self.has_valid_error() && self.invalid_observable().is_none()
     }
 }
 
@@ -186,7 +204,8 @@ mod tests {
     #[test]
     fn an_estimate_is_finite_and_a_failure_has_none() {
         let consistent = |outcome, estimated_error| {
-            RealizationResult { outcome, estimated_error, decay: 0.0 }.is_consistent()
+            RealizationResult { outcome, ..RealizationResult::solved(1.0, estimated_error) }
+                .is_consistent()
         };
         assert!(consistent(Ok(3900.0), 0.0) && consistent(Ok(3900.0), 2e-5));
         assert!(RealizationResult::failed(FailureKind::NoArrival).is_consistent());
@@ -199,9 +218,11 @@ mod tests {
     }
 
     #[test]
-    fn a_decay_is_finite_and_a_failure_has_none() {
+    fn an_observable_is_finite_and_a_failure_has_none() {
         let valid = |outcome, decay| {
-            RealizationResult { outcome, estimated_error: 0.0, decay }.has_valid_decay()
+            let mut result = RealizationResult { outcome, ..RealizationResult::solved(1.0, 0.0) };
+            result.observables[Observable::Decay] = decay;
+            result.invalid_observable().is_none()
         };
         assert!(valid(Ok(3900.0), 4.6) && valid(Ok(3900.0), -0.3) && valid(Ok(3900.0), 0.0));
         assert!(!valid(Ok(3900.0), f64::NAN) && !valid(Ok(3900.0), f64::INFINITY));

@@ -1,45 +1,46 @@
-//! All outcomes of one evaluation, with the decays if the job has measured ones.
+//! All outcomes of one evaluation, with the observables that its job has data of.
 
 use std::ops::Deref;
 use std::sync::Arc;
 
+use crate::observables::{ObservableSet, PerObservable};
 use crate::outcome::{Outcome, RealizationResult};
+
+/// A value of each realization for those observables that were asked for, in index order; 0 on failure.
+pub type ObservableColumns = PerObservable<Option<Arc<Vec<f64>>>>;
 
 /// Outcomes of one evaluation in index order; dereferences to them. Copies share the memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcomes {
     velocities: Arc<Vec<Outcome>>,
-    decays: Option<Arc<Vec<f64>>>,
+    observables: ObservableColumns,
 }
 
 impl Outcomes {
-    /// Creates the outcomes of these realizations, `with_decays` or without.
+    /// Creates the outcomes of these realizations, with these observables.
     pub fn of_results(
         results: impl Iterator<Item = RealizationResult> + Clone,
-        with_decays: bool,
+        observables: ObservableSet,
     ) -> Self {
-        let decays: Option<Vec<f64>> =
-            with_decays.then(|| results.clone().map(|result| result.decay).collect());
-        let velocities: Vec<Outcome> = results.map(|result| result.outcome).collect();
-        Self::shared(Arc::new(velocities), decays.map(Arc::new))
+        let column = |one| results.clone().map(move |result| result.observables[one]).collect();
+        let columns = PerObservable::new(|one| observables[one].then(|| Arc::new(column(one))));
+        Self::shared(Arc::new(results.map(|result| result.outcome).collect()), columns)
     }
 
-    /// Creates outcomes that share these lists, as many decays as outcomes.
-    pub fn shared(velocities: Arc<Vec<Outcome>>, decays: Option<Arc<Vec<f64>>>) -> Self {
-        Self { velocities, decays }
+    /// Creates outcomes that share these lists, which are all of the same length.
+    pub fn shared(velocities: Arc<Vec<Outcome>>, observables: ObservableColumns) -> Self {
+        Self { velocities, observables }
     }
 
-    /// Returns them with these decays, dB/cm: as many as outcomes, 0 on failure; `None` for a job
-    /// without measured decays.
+    /// Returns them with these values of observables: of each as many as outcomes, 0 on failure.
     #[must_use]
-    pub fn with_decays(self, decays: Option<Vec<f64>>) -> Self {
-        Self { decays: decays.map(Arc::new), ..self }
+    pub fn with_observables(self, values: PerObservable<Option<Vec<f64>>>) -> Self {
+        Self { observables: values.map(|values| values.map(Arc::new)), ..self }
     }
 
-    /// Returns the decay of each realization along the array, dB/cm, 0 on failure; `None` for a job
-    /// without measured decays.
-    pub fn decays(&self) -> Option<&[f64]> {
-        self.decays.as_deref().map(Vec::as_slice)
+    /// Returns the values of the observables that the job has data of, in index order, 0 on failure.
+    pub fn observables(&self) -> PerObservable<Option<&[f64]>> {
+        self.observables.as_ref().map(|values| values.as_ref().map(|values| values.as_slice()))
     }
 
     /// Returns whether both are copies of the same outcomes, without comparing these.
@@ -58,7 +59,7 @@ impl Deref for Outcomes {
 
 impl From<Vec<Outcome>> for Outcomes {
     fn from(outcomes: Vec<Outcome>) -> Self {
-        Self { velocities: Arc::new(outcomes), decays: None }
+        Self { velocities: Arc::new(outcomes), observables: ObservableColumns::default() }
     }
 }
 

@@ -6,7 +6,10 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::accepted::Interval;
 use crate::elasticity::EngineeringConstants;
+use crate::ensemble::DISPERSION_MAX;
+use crate::limits::QUALITY_FACTOR_MIN;
 
 /// Number of all parameters.
 pub const PARAMETERS: usize = BONE_PARAMETERS + 3;
@@ -45,6 +48,139 @@ pub enum Parameter {
     CouplingSoundSpeed,
 }
 
+/// What all parts of the program have to know of a parameter.
+#[derive(Debug)]
+pub struct ParameterRow {
+    /// Name in files and messages.
+    pub name: &'static str,
+    /// What it is.
+    pub meaning: &'static str,
+    /// Its name for people.
+    pub title: &'static str,
+    /// Its symbol.
+    pub symbol: &'static str,
+    /// Unit as printed after a number; empty for pure numbers.
+    pub unit: &'static str,
+    /// Values that are accepted, regardless of other fields.
+    pub accepted: Interval,
+    /// The unit in which people read it, and what one of that is in the unit of files.
+    pub shown_in: (&'static str, f64),
+    /// Whether its intervals are those of its logarithm.
+    pub scale: Scale,
+}
+
+/// The scale on which the error of a parameter is nearly normal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// That of its values.
+    Linear,
+    /// That of their logarithms.
+    Logarithmic,
+}
+
+const ROWS: [ParameterRow; PARAMETERS] = [
+    ParameterRow {
+        name: "density",
+        meaning: "mass density of the bone",
+        title: "density",
+        symbol: "ρ",
+        unit: "kg/m³",
+        accepted: Interval::above(0.0, "kg/m³"),
+        shown_in: ("kg/m³", 1.0),
+        scale: Scale::Logarithmic,
+    },
+    ParameterRow {
+        name: "longitudinal_young_modulus",
+        meaning: "longitudinal Young modulus",
+        title: "longitudinal Young modulus",
+        symbol: "e_L",
+        unit: "Pa",
+        accepted: Interval::above(0.0, "Pa"),
+        shown_in: ("GPa", 1e9),
+        scale: Scale::Logarithmic,
+    },
+    ParameterRow {
+        name: "longitudinal_poisson_ratio",
+        meaning: "longitudinal Poisson ratio",
+        title: "longitudinal Poisson ratio",
+        symbol: "ν_L",
+        unit: "",
+        accepted: Interval::finite(""),
+        shown_in: ("", 1.0),
+        scale: Scale::Linear,
+    },
+    ParameterRow {
+        name: "longitudinal_shear_modulus",
+        meaning: "longitudinal shear modulus",
+        title: "longitudinal shear modulus",
+        symbol: "g_L",
+        unit: "Pa",
+        accepted: Interval::above(0.0, "Pa"),
+        shown_in: ("GPa", 1e9),
+        scale: Scale::Logarithmic,
+    },
+    ParameterRow {
+        name: "transverse_young_modulus",
+        meaning: "transverse Young modulus",
+        title: "transverse Young modulus",
+        symbol: "e_T",
+        unit: "Pa",
+        accepted: Interval::above(0.0, "Pa"),
+        shown_in: ("GPa", 1e9),
+        scale: Scale::Logarithmic,
+    },
+    ParameterRow {
+        name: "transverse_poisson_ratio",
+        meaning: "transverse Poisson ratio",
+        title: "transverse Poisson ratio",
+        symbol: "ν_T",
+        unit: "",
+        accepted: Interval::between(-1.0, 1.0, ""),
+        shown_in: ("", 1.0),
+        scale: Scale::Linear,
+    },
+    ParameterRow {
+        name: "dispersion",
+        meaning: "dispersion of the random elasticity",
+        title: "dispersion",
+        symbol: "δ",
+        unit: "",
+        accepted: Interval::between(0.0, DISPERSION_MAX, "that is √(7/11)"),
+        shown_in: ("", 1.0),
+        scale: Scale::Logarithmic,
+    },
+    ParameterRow {
+        name: "bone_thickness",
+        meaning: "thickness of the bone",
+        title: "bone thickness",
+        symbol: "h",
+        unit: "m",
+        accepted: Interval::above(0.0, "m"),
+        shown_in: ("mm", 1e-3),
+        scale: Scale::Logarithmic,
+    },
+    ParameterRow {
+        name: "bone_quality_factor",
+        meaning: "quality factor of the bone",
+        title: "bone quality factor",
+        symbol: "Q",
+        unit: "",
+        accepted: Interval::at_least(QUALITY_FACTOR_MIN, ""),
+        shown_in: ("", 1.0),
+        scale: Scale::Logarithmic,
+    },
+    ParameterRow {
+        name: "coupling_sound_speed",
+        meaning: "speed of sound of the coupling layer",
+        title: "speed of sound of the coupling layer",
+        symbol: "c₁",
+        unit: "m/s",
+        accepted: Interval::above(0.0, "m/s"),
+        shown_in: ("m/s", 1.0),
+        scale: Scale::Logarithmic,
+    },
+];
+
 impl Parameter {
     /// All parameters, in their order.
     pub const ALL: [Self; PARAMETERS] = [
@@ -72,36 +208,19 @@ impl Parameter {
         [thickness, quality, speed]
     };
 
+    /// Returns the row of the table.
+    pub const fn row(self) -> &'static ParameterRow {
+        &ROWS[self as usize]
+    }
+
     /// Returns the name used in files and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Density => "density",
-            Self::LongitudinalYoungModulus => "longitudinal_young_modulus",
-            Self::LongitudinalPoissonRatio => "longitudinal_poisson_ratio",
-            Self::LongitudinalShearModulus => "longitudinal_shear_modulus",
-            Self::TransverseYoungModulus => "transverse_young_modulus",
-            Self::TransversePoissonRatio => "transverse_poisson_ratio",
-            Self::Dispersion => "dispersion",
-            Self::BoneThickness => "bone_thickness",
-            Self::BoneQualityFactor => "bone_quality_factor",
-            Self::CouplingSoundSpeed => "coupling_sound_speed",
-        }
+    pub const fn name(self) -> &'static str {
+        self.row().name
     }
 
     /// Returns the unit as printed after a number; empty for pure numbers.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Density => "kg/m³",
-            Self::LongitudinalYoungModulus
-            | Self::LongitudinalShearModulus
-            | Self::TransverseYoungModulus => "Pa",
-            Self::LongitudinalPoissonRatio
-            | Self::TransversePoissonRatio
-            | Self::Dispersion
-            | Self::BoneQualityFactor => "",
-            Self::BoneThickness => "m",
-            Self::CouplingSoundSpeed => "m/s",
-        }
+    pub const fn unit(self) -> &'static str {
+        self.row().unit
     }
 }
 
@@ -163,5 +282,19 @@ impl Point {
     /// Returns the dispersion δ.
     pub fn dispersion(&self) -> f64 {
         self.0[6]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_parameter_refuses_what_is_not_finite() {
+        for parameter in Parameter::ALL {
+            for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                assert!(!parameter.row().accepted.contains(value), "{}", parameter.name());
+            }
+        }
     }
 }

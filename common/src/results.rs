@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::conclusions::Conclusions;
 use crate::job::{Objective, Sampling, Search};
 use crate::moments::{KolmogorovTest, MomentIntervals, Outlier};
+use crate::observables::ObservableMeans;
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
 use crate::posterior::PosteriorDraw;
@@ -13,7 +14,9 @@ use crate::sampling::NominalSampling;
 use crate::settings::{Picking, SolverSettings};
 use crate::version::Program;
 
-pub use crate::moments::{DecayEstimate, Estimate, EstimatedError, Moments};
+pub use crate::moments::{
+    ComparedMoments, Estimate, EstimatedError, Moments, ObservableEstimate, ObservableEstimates,
+};
 
 /// Final status of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -126,8 +129,8 @@ pub struct Evaluation {
     /// Moments over the successes, unless there are none. For an evaluation that measures a
     /// derivative, also `None` if other realizations failed than at the best point.
     pub moments: Option<Moments>,
-    /// Mean decay over the successes, dB/cm, where there are moments and decays were measured.
-    pub decay: Option<f64>,
+    /// Means over the successes of the observables that were measured, where there are moments.
+    pub observables: ObservableMeans,
     /// Cost; infinite at an infeasible point; `None` for a propagation.
     pub cost: Option<f64>,
     /// Failed realizations by kind.
@@ -137,6 +140,11 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
+    /// Returns the moments that are compared with the data, where there are any.
+    pub fn compared(&self) -> Option<ComparedMoments> {
+        Some(ComparedMoments { velocities: self.moments?, observables: self.observables })
+    }
+
     /// Whether it belongs to a search for this set of data.
     pub fn belongs_to(&self, set: usize) -> bool {
         self.role.group as usize == set
@@ -167,8 +175,8 @@ impl PointMeaning {
 pub struct DataSummary {
     /// Moments of the data.
     pub moments: Moments,
-    /// Mean of the measured decays, with its error by their scatter; `None` if none were measured.
-    pub decay: Option<DecayEstimate>,
+    /// The measured observables, with the error of each mean by their scatter.
+    pub observables: ObservableEstimates,
     /// Number of velocities; `None` if only their moments are known.
     pub count: Option<u64>,
     /// Confidence intervals of the moments of their law; `None` if only the moments are known, or
@@ -322,9 +330,9 @@ pub struct BestPoint {
     pub below_noise_from: Option<u64>,
     /// Its moments with standard errors, unless every realization failed.
     pub velocity: Option<Estimate>,
-    /// The mean of its decays, with its error by sampling; `None` if no decays were measured, or every
+    /// The observables that were measured, with the error of each mean by sampling; `None` if every
     /// realization failed.
-    pub decay: Option<DecayEstimate>,
+    pub observables: ObservableEstimates,
     /// Change of the moments if the failed realizations had the velocities expected from their
     /// tensors; `None` if that is unknown.
     pub failure_bias: Option<Moments>,

@@ -7,15 +7,16 @@
 mod blocks;
 mod central;
 mod controlled;
-mod decay;
 mod failure_bias;
 mod kernel_density;
 mod likelihood;
 mod measured;
+mod observed;
 mod sum;
 
 use crate::job::{MonteCarlo, Sampling};
-use crate::moments::{Estimate, Moments};
+use crate::moments::{ComparedMoments, Estimate, Moments};
+use crate::observables::ObservableMeans;
 use crate::outcome::Outcome;
 use crate::outcomes::Outcomes;
 use crate::parameters::Point;
@@ -24,10 +25,12 @@ use self::blocks::DoublingFactors;
 use self::central::{Central, central};
 use self::controlled::Controlled;
 
-pub use self::decay::{covariance_with_decay, decay_estimate, mean_decay, measured_decay};
 pub use self::failure_bias::failure_bias;
 pub use self::likelihood::{LikelihoodFit, likelihood_cost, likelihood_error, likelihood_fit};
 pub use self::measured::{covariance_of_logarithms, without_repeatability};
+pub use self::observed::{
+    covariance_of_moments, measured_observables, observable_estimates, observable_means,
+};
 pub(crate) use self::sum::Sum;
 
 /// Returns mean and coefficient of variation (the paper's Secs. 2 and 5), or `None` for no
@@ -85,17 +88,17 @@ pub fn cost(data: Moments, model: Moments) -> f64 {
 pub struct PointStatistics {
     /// Moments over the successes, unless there are none.
     pub moments: Option<Moments>,
-    /// Mean decay over the successes, dB/cm, where there are moments and decays were measured.
-    pub decay: Option<f64>,
+    /// Means over the successes of the observables that were measured.
+    pub observables: ObservableMeans,
     /// Whether at most the accepted fraction of realizations failed, and at least one succeeded.
     pub feasible: bool,
 }
 
 impl PointStatistics {
-    /// Same as [`Self::from_outcomes`], with the mean of the decays.
+    /// Same as [`Self::from_outcomes`], with the means of the observables.
     pub fn new(monte_carlo: &MonteCarlo, point: &Point, outcomes: &Outcomes) -> Self {
         let of_velocities = Self::from_outcomes(monte_carlo, point, outcomes);
-        Self { decay: mean_decay(outcomes), ..of_velocities }
+        Self { observables: observable_means(outcomes), ..of_velocities }
     }
 
     /// Computes moments and feasibility from the outcomes of every index of an evaluation at
@@ -106,24 +109,35 @@ impl PointStatistics {
         let moments =
             Sample::from_outcomes(monte_carlo, point, outcomes).map(|sample| sample.moments());
         let within = failed as f64 / outcomes.len() as f64 <= monte_carlo.max_failed_fraction;
-        Self { moments, decay: None, feasible: moments.is_some() && within }
+        let observables = ObservableMeans::default();
+        Self { moments, observables, feasible: moments.is_some() && within }
     }
 
-    /// Returns the cost against the data's moments: infinite at an infeasible point, never NaN.
-    pub fn cost(&self, data: Moments) -> f64 {
-        self.cost_by(|model| cost(data, model))
+    /// Returns the paper's cost against the data's moments, to which each observable adds the square of
+    /// the relative difference of its mean: infinite at an infeasible point, never NaN.
+    pub fn cost(&self, data: &ComparedMoments) -> f64 {
+        self.cost_by(|model| {
+            let [_, _, observables @ ..] = model.differences(data);
+            let of_observables = observables.iter().map(|difference| difference * difference);
+            cost(data.velocities, model.velocities) + of_observables.sum::<f64>()
+        })
     }
 
     /// Returns the cost by a function of the model's moments: infinite at an infeasible point, never
     /// NaN.
-    pub fn cost_by(&self, cost: impl Fn(Moments) -> f64) -> f64 {
-        match self.moments {
+    pub fn cost_by(&self, cost: impl Fn(&ComparedMoments) -> f64) -> f64 {
+        match self.compared() {
             Some(model) if self.feasible => {
-                let cost = cost(model);
+                let cost = cost(&model);
                 if cost.is_nan() { f64::INFINITY } else { cost }
             }
             _ => f64::INFINITY,
         }
+    }
+
+    /// Returns the moments that are compared with the data, unless there are none.
+    pub fn compared(&self) -> Option<ComparedMoments> {
+        Some(ComparedMoments { velocities: self.moments?, observables: self.observables })
     }
 }
 
@@ -196,6 +210,10 @@ mod tests {
     fn point_statistics(outcomes: &[Outcome], max_failed_fraction: f64) -> PointStatistics {
         let monte_carlo = MonteCarlo { max_failed_fraction, ..MonteCarlo::default() };
         PointStatistics::from_outcomes(&monte_carlo, &OPTIMUM, outcomes)
+    }
+
+    fn of_velocities(mean: f64, coefficient_of_variation: f64) -> ComparedMoments {
+        Moments { mean, coefficient_of_variation }.into()
     }
 
     fn close(value: f64, expected: f64) {
@@ -289,7 +307,7 @@ mod tests {
 
     #[test]
     fn too_many_failures_make_a_point_infeasible() {
-        let data = Moments { mean: 8.0, coefficient_of_variation: 0.25 };
+        let data = of_velocities(8.0, 0.25);
         let check = |failed: usize, total: usize, fraction: f64, feasible: bool| {
             let outcomes: Vec<Outcome> = (0..total)
                 .map(|k| {
@@ -298,8 +316,8 @@ mod tests {
                 .collect();
             let point_statistics = point_statistics(&outcomes, fraction);
             assert_eq!(point_statistics.feasible, feasible, "{failed} of {total}, {fraction}");
-            assert_eq!(point_statistics.cost(data).is_finite(), feasible);
-            assert!(!point_statistics.cost(data).is_nan());
+            assert_eq!(point_statistics.cost(&data).is_finite(), feasible);
+            assert!(!point_statistics.cost(&data).is_nan());
             assert_eq!(point_statistics.moments.is_some(), failed < total);
         };
         check(0, 100, 0.0, true);
@@ -314,7 +332,7 @@ mod tests {
 
     #[test]
     fn a_cost_is_never_nan() {
-        let data = Moments { mean: 4.0, coefficient_of_variation: 0.0 };
-        assert_eq!(point_statistics(&[Ok(4.0)], 0.0).cost(data), f64::INFINITY);
+        let data = of_velocities(4.0, 0.0);
+        assert_eq!(point_statistics(&[Ok(4.0)], 0.0).cost(&data), f64::INFINITY);
     }
 }

@@ -11,6 +11,7 @@
 pub mod access;
 pub mod config;
 pub mod core;
+#[cfg(feature = "live")]
 pub mod live;
 pub(crate) mod metrics;
 pub mod service;
@@ -20,9 +21,8 @@ pub use access::Policy;
 pub use access::tls::Tls;
 pub use access::tokens::Tokens;
 pub use config::Config;
-pub use live::listener::{PageBindError, PageListener};
-pub use live::other_pages::{OwnHosts, host_of, is_cross_site};
-pub use live::stalled::ReadPeer;
+#[cfg(feature = "live")]
+pub use live::listener::PageBindError;
 pub use service::failing::ComponentFailure;
 pub use service::listen::{BindError, ListenAddress, Listener};
 pub use service::metrics_listener::{MetricsBindError, MetricsListener};

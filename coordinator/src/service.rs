@@ -3,6 +3,7 @@
 
 pub(crate) mod accept;
 pub(crate) mod backing_up;
+pub(crate) mod beside;
 pub(crate) mod control_frames;
 pub(crate) mod core_task;
 pub(crate) mod failing;

@@ -206,7 +206,7 @@ async fn an_evaluation_comes_once_on_each_stream() {
         let worker = work_with(channel(&coordinator).await, BATCHES, |message| match message {
             Response::Evaluation(message) => {
                 assert!(batches.is_empty(), "an evaluation came after its first batch");
-                evaluations.push(*message);
+                evaluations.push(message.clone());
             }
             Response::Batch(message) => batches.push(message.evaluation),
             _ => {}

@@ -6,7 +6,6 @@ use osteon_common::case::{Bone, Case};
 use osteon_common::check;
 use osteon_common::elasticity::{Elasticity, EngineeringConstants};
 use osteon_common::field_path::element_path;
-use osteon_common::fields::Interval;
 use osteon_common::limits;
 use osteon_common::parameters::Parameter;
 use osteon_common::plausible::PlausibleRange;
@@ -150,7 +149,7 @@ fn required(
     base: Base,
     typed: bool,
 ) -> Option<f64> {
-    let (key, accepted) = (parameter.name(), Interval::accepted_for(parameter));
+    let (key, accepted) = (parameter.name(), parameter.row().accepted);
     if !table.has(key) {
         let value = base.value(parameter);
         if value.is_none() {

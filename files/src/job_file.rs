@@ -3,6 +3,7 @@
 mod csv_format;
 mod data_section;
 mod key_tables;
+mod observables;
 mod parameters;
 mod posterior;
 mod priors;

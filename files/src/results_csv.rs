@@ -4,6 +4,7 @@
 use std::fmt::{self, Write as _};
 
 use osteon_common::job::{Data, JobSpecification, Range};
+use osteon_common::observables::ObservableSet;
 use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Parameter;
 use osteon_common::results::{Evaluation, Status};
@@ -20,14 +21,15 @@ pub fn history(specification: &JobSpecification, evaluations: &[Evaluation]) -> 
     let parameters = parameters.join(",");
     let names: Vec<&str> = specification.data.iter().flat_map(Data::names).collect();
     let several = specification.search.starts > 1;
-    let decay = if specification.has_decays() { "decay," } else { "" };
+    let measured = specification.observables();
+    let observables: String = measured.members().map(|one| format!("{},", one.name())).collect();
     let mut out =
-        format!("evaluation,{parameters},mean,coefficient_of_variation,{decay}cost,failures");
+        format!("evaluation,{parameters},mean,coefficient_of_variation,{observables}cost,failures");
     out.push_str(if several { ",start" } else { "" });
     out.push_str(if names.is_empty() { "\n" } else { ",group\n" });
     for evaluation in evaluations.iter().filter(|evaluation| evaluation.role.is_of_search()) {
         // Writing to a string does not fail.
-        let _infallible = history_row(&mut out, evaluation, specification.has_decays());
+        let _infallible = history_row(&mut out, evaluation, measured);
         if several {
             let _infallible = write!(out, ",{}", evaluation.role.start);
         }
@@ -64,7 +66,7 @@ pub fn field(text: &str) -> String {
 /// Characters that begin a formula, or are skipped before one (OWASP, "CSV Injection").
 const FORMULA: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
 
-fn history_row(out: &mut String, evaluation: &Evaluation, has_decays: bool) -> fmt::Result {
+fn history_row(out: &mut String, evaluation: &Evaluation, measured: ObservableSet) -> fmt::Result {
     write!(out, "{}", evaluation.number)?;
     for (_, value) in evaluation.point.given() {
         write!(out, ",{value:?}")?;
@@ -74,8 +76,8 @@ fn history_row(out: &mut String, evaluation: &Evaluation, has_decays: bool) -> f
         moments.map(|moments| moments.mean),
         moments.map(|moments| moments.coefficient_of_variation),
     ];
-    let decay = has_decays.then_some(evaluation.decay);
-    for value in moments.into_iter().chain(decay).chain([evaluation.cost]) {
+    let observables = measured.members().map(|one| evaluation.observables[one]);
+    for value in moments.into_iter().chain(observables).chain([evaluation.cost]) {
         match value {
             Some(value) => write!(out, ",{value:?}")?,
             None => out.push(','),

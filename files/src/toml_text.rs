@@ -9,6 +9,7 @@ use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, Section, entries};
 use osteon_common::job::{
     Data, Group, JobSpecification, Measurements, PosteriorSettings, Prior, Range, Search,
 };
+use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::Parameter;
 
 /// Number of velocities per line of an inlined data set.
@@ -125,8 +126,8 @@ fn data(out: &mut String, data: &Data) -> fmt::Result {
         writeln!(out, "\n[data]  # m/s")?;
     }
     match &data.measurements {
-        Measurements::Velocities { velocities: measured, subjects, decays } => {
-            set(out, measured, subjects.as_deref(), decays.as_deref())?;
+        Measurements::Velocities { velocities: measured, subjects, observables } => {
+            set(out, measured, subjects.as_deref(), observables)?;
         }
         Measurements::Groups(_) => {}
         Measurements::Moments { mean, coefficient_of_variation, count } => {
@@ -147,7 +148,7 @@ fn data(out: &mut String, data: &Data) -> fmt::Result {
 /// table.
 fn groups(out: &mut String, groups: &[Group]) -> fmt::Result {
     let has_more = |group: &Group| {
-        group.subjects.is_some() || group.decays.is_some() || !group.known.is_empty()
+        group.subjects.is_some() || !group.observables.set().is_empty() || !group.known.is_empty()
     };
     if groups.iter().any(has_more) {
         return groups.iter().try_for_each(|group| {
@@ -159,7 +160,7 @@ fn groups(out: &mut String, groups: &[Group]) -> fmt::Result {
                     unit => writeln!(out, "  # {unit}")?,
                 }
             }
-            set(out, &group.velocities, group.subjects.as_deref(), group.decays.as_deref())
+            set(out, &group.velocities, group.subjects.as_deref(), &group.observables)
         });
     }
     writeln!(out, "\n[data.groups]  # m/s")?;
@@ -170,14 +171,14 @@ fn set(
     out: &mut String,
     velocities: &[f64],
     subjects: Option<&[u32]>,
-    decays: Option<&[f64]>,
+    observables: &ObservedColumns,
 ) -> fmt::Result {
     list(out, "velocities", velocities)?;
     subjects.map_or(Ok(()), |subjects| list(out, "subjects", subjects))?;
     // A table of groups has the unit of velocities in its head.
-    decays.map_or(Ok(()), |decays| {
-        writeln!(out, "# dB/cm")?;
-        list(out, "decays", decays)
+    observables.present().try_for_each(|(observable, values)| {
+        writeln!(out, "# {}", observable.row().unit)?;
+        list(out, observable.row().plural, values)
     })
 }
 

@@ -6,6 +6,7 @@ mod csv_job;
 use std::fmt::Write as _;
 
 use osteon_common::job::{Data, Group, NoVariation};
+use osteon_common::observables::Observable;
 
 use csv_job::{read_as, warnings};
 
@@ -76,7 +77,10 @@ fn decays_are_a_column() {
     let data = read_as(format!("dB/cm,velocity\n{lines}").as_bytes(), more).unwrap().unwrap();
     let (velocities, decays): (Vec<f64>, Vec<f64>) = rows.into_iter().unzip();
     let found = data.set(0).unwrap();
-    assert_eq!((found.velocities, found.decays), (&velocities[..], Some(&decays[..])));
+    assert_eq!(
+        (found.velocities, found.observables[Observable::Decay]),
+        (&velocities[..], Some(&decays[..]))
+    );
     let check = |rows: &str, expected: &str| {
         let text = format!("dB/cm,velocity\n{rows}{lines}");
         let message = read_as(text.as_bytes(), more).unwrap_err();

@@ -83,7 +83,7 @@ mod tests {
             point: Point::of_bone([1.0; 7]),
             germs,
             random: RandomQuantities::default(),
-            with_decays: false,
+            observables: osteon_common::observables::ObservableSet::NONE,
         }
     }
 

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use osteon_common::limits::{BATCH_REALIZATIONS_MAX, REALIZATIONS_MAX};
+use osteon_common::observables::PerObservable;
 use osteon_common::outcome::{self, RealizationResult};
 
 use crate::announced::Received;
 use crate::evaluation::EvaluationInput;
 use crate::malformed::Malformed;
+use crate::observed;
 use crate::v1;
 
 /// Longest computing time that an answer may state, s: a hundred days, which no batch takes.
@@ -59,21 +61,23 @@ pub fn answer_to_message(
 ) -> v1::BatchResult {
     let (codes, velocities) = solved.iter().map(|solved| outcome::encode(solved.outcome)).unzip();
     let estimated_errors = solved.iter().map(|solved| solved.estimated_error).collect();
-    let has_decays = solved.iter().any(|solved| solved.decay.to_bits() != 0);
-    let decays = match has_decays {
-        true => solved.iter().map(|solved| solved.decay).collect(),
-        false => Vec::new(),
-    };
-    v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors, decays }
+    let columns = PerObservable::new(|one| {
+        let has_values = solved.iter().any(|solved| solved.observables[one].to_bits() != 0);
+        has_values.then(|| solved.iter().map(|solved| solved.observables[one]).collect())
+    });
+    let observables = observed::columns_to_messages(&columns);
+    v1::BatchResult { batch, codes, velocities, elapsed_s, estimated_errors, observables }
 }
 
 /// Returns the realizations of an answer, in index order.
 ///
 /// # Errors
-/// If the lengths differ, if a code and a velocity do not encode an outcome, if an estimated error or a
-/// decay is not allowed for its outcome, or if the computing time is none. Without decays, each is 0.
+/// If the lengths differ, if a code and a velocity do not encode an outcome, if an estimated error or an
+/// observable is not allowed for its outcome or unknown, or if the computing time is none. Observables that
+/// are not given are 0.
 pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationResult>, Malformed> {
-    let v1::BatchResult { codes, velocities, estimated_errors, decays, elapsed_s, .. } = message;
+    let v1::BatchResult { codes, velocities, estimated_errors, observables, elapsed_s, .. } =
+        message;
     if !(0.0..=ELAPSED_S_MAX).contains(elapsed_s) {
         let allowed = "it must be from 0 to 10^7 s";
         return Err(Malformed::OutOfRange { field: "elapsed_s", value: *elapsed_s, allowed });
@@ -86,9 +90,9 @@ pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationR
             return Err(Malformed::WrongLength { field, found, expected });
         }
     }
-    let has_decays = !decays.is_empty();
-    if has_decays && decays.len() != expected {
-        let (field, found) = ("decays", decays.len());
+    let columns = observed::columns_from_messages(observables)?;
+    if let Some((_, column)) = columns.present().find(|(_, column)| column.len() != expected) {
+        let (field, found) = ("observables", column.len());
         return Err(Malformed::WrongLength { field, found, expected });
     }
     let rows = codes.iter().zip(velocities).zip(estimated_errors).enumerate();
@@ -96,13 +100,15 @@ pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationR
     for (index, ((&code, &velocity), &estimated_error)) in rows {
         let outcome = outcome::decode(code, velocity);
         let outcome = outcome.ok_or(Malformed::Outcome { index, code, velocity })?;
-        let decay = if has_decays { decays[index] } else { 0.0 };
-        let solved = RealizationResult { outcome, estimated_error, decay };
+        let observables =
+            columns.as_ref().map(|column| column.as_ref().map_or(0.0, |all| all[index]));
+        let solved = RealizationResult { outcome, estimated_error, observables };
         if !solved.has_valid_error() {
             return Err(Malformed::EstimatedError { index, value: estimated_error });
         }
-        if !solved.has_valid_decay() {
-            return Err(Malformed::Decay { index, value: decay });
+        if let Some(observable) = solved.invalid_observable() {
+            let value = observables[observable];
+            return Err(Malformed::ObservedValue { index, observable, value });
         }
         results.push(solved);
     }
@@ -113,6 +119,7 @@ pub fn answer_from_message(message: &v1::BatchResult) -> Result<Vec<RealizationR
 mod tests {
     use osteon_common::case::Setup;
     use osteon_common::germ_source::GermSource;
+    use osteon_common::observables::Observable;
     use osteon_common::outcome::FailureKind;
     use osteon_common::parameters::Point;
     use osteon_common::random_quantities::RandomQuantities;
@@ -128,7 +135,7 @@ mod tests {
             setup: Setup::default(),
             point: Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
             random: RandomQuantities::default(),
-            with_decays: false,
+            observables: osteon_common::observables::ObservableSet::NONE,
             germs: GermSource::streams(1),
         })
     }
@@ -153,9 +160,9 @@ mod tests {
     #[test]
     fn answers_survive_the_wire_and_unsound_ones_do_not() {
         let solved = [
-            RealizationResult { outcome: Ok(3900.5), estimated_error: 2e-5, decay: 0.0 },
+            RealizationResult::solved(3900.5, 2e-5),
             RealizationResult::failed(FailureKind::NoArrival),
-            RealizationResult { outcome: Ok(3901.5), estimated_error: 0.0, decay: 0.0 },
+            RealizationResult::solved(3901.5, 0.0),
         ];
         let message = answer_to_message(7, &solved, 0.25);
         assert_eq!((message.batch, message.elapsed_s), (7, 0.25));
@@ -189,29 +196,39 @@ mod tests {
     }
 
     #[test]
-    fn decays_survive_the_wire_and_none_take_no_bytes() {
+    fn observables_survive_the_wire_and_none_take_no_bytes() {
+        let with_decay = |mut solved: RealizationResult, decay| {
+            solved.observables[Observable::Decay] = decay;
+            solved
+        };
         let solved = [
-            RealizationResult { outcome: Ok(3900.5), estimated_error: 2e-5, decay: 4.625 },
+            with_decay(RealizationResult::solved(3900.5, 2e-5), 4.625),
             RealizationResult::failed(FailureKind::NoArrival),
-            RealizationResult { outcome: Ok(3901.5), estimated_error: 0.0, decay: -0.5 },
+            with_decay(RealizationResult::solved(3901.5, 0.0), -0.5),
         ];
         let message = answer_to_message(7, &solved, 0.25);
-        assert_eq!(message.decays, [4.625, 0.0, -0.5]);
+        assert_eq!(message.observables[0].values, [4.625, 0.0, -0.5]);
         assert_eq!(answer_from_message(&message).unwrap(), solved);
-        let without = solved.map(|one| RealizationResult { decay: 0.0, ..one });
-        assert_eq!(answer_to_message(7, &without, 0.25).decays, [0.0; 0]);
+        let without = solved.map(|one| with_decay(one, 0.0));
+        assert_eq!(answer_to_message(7, &without, 0.25).observables, []);
         let refused = |change: fn(&mut v1::BatchResult)| {
             let mut message = message.clone();
             change(&mut message);
             answer_from_message(&message).unwrap_err()
         };
-        let (field, found, expected) = ("decays", 2, 3);
-        let short = refused(|answer| answer.decays.truncate(2));
+        let (field, found, expected) = ("observables", 2, 3);
+        let short = refused(|answer| answer.observables[0].values.truncate(2));
         assert_eq!(short, Malformed::WrongLength { field, found, expected });
-        let of_failure = refused(|answer| answer.decays[1] = 4.6);
-        assert_eq!(of_failure, Malformed::Decay { index: 1, value: 4.6 });
-        let infinite = refused(|answer| answer.decays[2] = f64::INFINITY);
-        assert_eq!(infinite, Malformed::Decay { index: 2, value: f64::INFINITY });
+        let wrong = |index, value| {
+            let observable = Observable::Decay;
+            Malformed::ObservedValue { index, observable, value }
+        };
+        let of_failure = refused(|answer| answer.observables[0].values[1] = 4.6);
+        assert_eq!(of_failure, wrong(1, 4.6));
+        let infinite = refused(|answer| answer.observables[0].values[2] = f64::INFINITY);
+        assert_eq!(infinite, wrong(2, f64::INFINITY));
+        let unknown = refused(|answer| answer.observables[0].observable.push('s'));
+        assert_eq!(unknown, Malformed::Observable { name: "decays".to_owned() });
     }
 
     #[test]

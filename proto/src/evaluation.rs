@@ -5,12 +5,14 @@ use osteon_common::check;
 use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::job::Sampling;
 use osteon_common::limits::{REALIZATIONS_MAX, SEED_MAX};
+use osteon_common::observables::ObservableSet;
 use osteon_common::parameters::Point;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::violations::Violations;
 
 use crate::choice::SAMPLING;
 use crate::malformed::Malformed;
+use crate::observed;
 use crate::parameter_values::{point_from_message, point_to_message};
 use crate::setup::{self, SetupMessages, random_from_message, random_to_message};
 use crate::v1;
@@ -29,8 +31,8 @@ pub struct EvaluationInput {
     pub germs: GermSource,
     /// Scatter of quantities of the setup.
     pub random: RandomQuantities,
-    /// Whether the decay of each realization is asked for.
-    pub with_decays: bool,
+    /// The observables of each realization that are asked for.
+    pub observables: ObservableSet,
 }
 
 /// Returns the message of an evaluation.
@@ -51,7 +53,7 @@ pub fn to_message(evaluation: &EvaluationInput) -> v1::Evaluation {
         sampling: SAMPLING.number(sampling),
         points_per_scramble: points,
         random: random_to_message(&evaluation.random),
-        with_decays: evaluation.with_decays,
+        observables: observed::names(evaluation.observables),
     }
 }
 
@@ -59,7 +61,7 @@ pub fn to_message(evaluation: &EvaluationInput) -> v1::Evaluation {
 ///
 /// # Errors
 /// If the setup is incomplete (a worker must not fill in its own defaults) or invalid, if the point
-/// does not have seven finite numbers, or if a number is beyond its limit.
+/// does not have seven finite numbers, if a number is beyond its limit, or if an observable is unknown.
 pub fn from_message(message: &v1::Evaluation) -> Result<EvaluationInput, Malformed> {
     if message.seed > SEED_MAX {
         let allowed = "it must be at most 2^63 - 1";
@@ -76,8 +78,8 @@ pub fn from_message(message: &v1::Evaluation) -> Result<EvaluationInput, Malform
     let sampling = SAMPLING.required(message.sampling, "sampling")?;
     violations.into_result(()).map_err(Malformed::InvalidSetup)?;
     let germs = GermSource { seed: message.seed, scheme: scheme(message, sampling)? };
-    let with_decays = message.with_decays;
-    Ok(EvaluationInput { id: message.evaluation, setup, point, germs, random, with_decays })
+    let observables = observed::set_from_names(&message.observables)?;
+    Ok(EvaluationInput { id: message.evaluation, setup, point, germs, random, observables })
 }
 
 /// Returns the scheme by which germs are generated from the seed.
@@ -146,7 +148,7 @@ mod tests {
         point: Point::of_bone([density, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]),
         random: RandomQuantities::default(),
         germs: GermSource::streams(seed),
-        with_decays: false,
+        observables: ObservableSet::NONE,
     };
 
     properties! {
@@ -157,10 +159,10 @@ mod tests {
             seed in 0..=SEED_MAX,
             points in proptest::option::of(1..=REALIZATIONS_MAX),
             deviation in proptest::option::of(1e-6..1e-4),
-            with_decays in any::<bool>(),
+            observables in any::<[bool; 3]>(),
         ) {
             let mut evaluation = EVALUATION(id, density, seed);
-            evaluation.with_decays = with_decays;
+            evaluation.observables = osteon_common::observables::PerObservable(observables);
             evaluation.setup.layers.bone_thickness = thickness;
             evaluation.random.bone_thickness.standard_deviation = deviation;
             if let Some(points) = points {

@@ -6,6 +6,7 @@ use osteon_common::results::{EstimatedError, Evaluation, EvaluationRole, GroupEn
 
 use crate::choice::{FAILURE_KIND, JOB_STATUS, PARAMETER};
 use crate::malformed::Malformed;
+use crate::observed::{means_from_messages, means_to_messages};
 use crate::parameter_values::{point_from_message, point_to_message};
 use crate::v1;
 
@@ -43,15 +44,15 @@ pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
         start: evaluation.role.start,
         varied: evaluation.role.varied.map(|parameter| PARAMETER.number(parameter)),
         posterior: evaluation.role.posterior,
-        decay: evaluation.decay,
+        observables: means_to_messages(&evaluation.observables),
     }
 }
 
 /// Returns one row of the history.
 ///
 /// # Errors
-/// If the point does not have seven finite numbers, or if a failure kind or the varied parameter is
-/// unknown.
+/// If the point does not have seven finite numbers, or if a failure kind, the varied parameter or
+/// an observable is unknown.
 pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation, Malformed> {
     let varied = message.varied.map(|number| PARAMETER.required(number, "varied")).transpose()?;
     let &v1::EvaluationRow { group, start, posterior, .. } = message;
@@ -61,7 +62,7 @@ pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation
         role,
         point: point_from_message(message.point.as_ref())?,
         moments: message.moments.as_ref().map(moments_from_message),
-        decay: message.decay,
+        observables: means_from_messages(&message.observables)?,
         cost: message.cost,
         failures: failures_from_message(&message.failures)?,
         estimated_error: message.estimated_error.map(errors_from_message).transpose()?,

@@ -21,6 +21,7 @@ mod fields;
 pub mod history;
 pub mod identity;
 pub mod malformed;
+pub mod observed;
 pub mod parameter_values;
 pub mod patience;
 mod pipe;

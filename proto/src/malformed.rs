@@ -1,5 +1,6 @@
 //! Defects of messages between the programs of osteon.
 
+use osteon_common::observables::Observable;
 use osteon_common::violations::Violations;
 use thiserror::Error;
 
@@ -64,13 +65,24 @@ pub enum Malformed {
         /// The number found.
         value: f64,
     },
-    /// A decay is not one that an outcome can have.
-    #[error("realization {index} has the decay {value}; it must be finite, and 0 on failure")]
-    Decay {
+    /// An observable is not one that an outcome can have.
+    #[error(
+        "realization {index} has the {} {value}; it must be finite, and 0 on failure",
+        .observable.row().title
+    )]
+    ObservedValue {
         /// Index within the block.
         index: usize,
+        /// The observable.
+        observable: Observable,
         /// The number found.
         value: f64,
+    },
+    /// An observable is unknown, or comes twice.
+    #[error("the observable {name:?} is unknown to this version of osteon, or comes twice")]
+    Observable {
+        /// Its name.
+        name: String,
     },
     /// The setup of an evaluation lacks a field, so its results would depend on the worker's
     /// defaults.

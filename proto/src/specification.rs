@@ -7,12 +7,14 @@ use osteon_common::job::{
     Range, Search,
 };
 use osteon_common::known_quantities::KnownQuantities;
+use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::violations::Violations;
 
 use crate::choice::{JOB_KIND, PARAMETER};
 use crate::fields;
+use crate::observed;
 use crate::posterior_settings;
 use crate::setup;
 use crate::setup::{random_from_message, random_to_message};
@@ -112,23 +114,24 @@ fn data_to_message(data: &Data) -> v1::Data {
     let message = v1::Data { repeatability: Some(data.repeatability), ..v1::Data::default() };
     let numbers = |subjects: &Option<Vec<u32>>| subjects.clone().unwrap_or_default();
     match &data.measurements {
-        Measurements::Velocities { velocities, subjects, decays } => v1::Data {
+        Measurements::Velocities { velocities, subjects, observables } => v1::Data {
             velocities: velocities.clone(),
             subjects: numbers(subjects),
-            decays: decays.clone().unwrap_or_default(),
+            observables: observed::columns_to_messages(observables),
             ..message
         },
         Measurements::Groups(groups) => {
-            let group =
-                |Group { name, velocities, subjects, decays, known }: &Group| v1::VelocityGroup {
+            let group = |Group { name, velocities, subjects, observables, known }: &Group| {
+                v1::VelocityGroup {
                     name: name.clone(),
                     velocities: velocities.clone(),
                     subjects: numbers(subjects),
-                    decays: decays.clone().unwrap_or_default(),
+                    observables: observed::columns_to_messages(observables),
                     bone_thickness: known.get(Parameter::BoneThickness),
                     bone_quality_factor: known.get(Parameter::BoneQualityFactor),
                     coupling_sound_speed: known.get(Parameter::CouplingSoundSpeed),
-                };
+                }
+            };
             v1::Data { groups: groups.iter().map(group).collect(), ..message }
         }
         Measurements::Moments { mean, coefficient_of_variation, count } => v1::Data {
@@ -146,8 +149,8 @@ fn data_from_message(message: &v1::Data, violations: &mut Violations) -> Option<
     if !message.subjects.is_empty() && !has_velocities {
         violations.add("data.subjects", "has no velocities beside it; leave it out");
     }
-    if !message.decays.is_empty() && !has_velocities {
-        violations.add("data.decays", "has no velocities beside it; leave it out");
+    if !message.observables.is_empty() && !has_velocities {
+        violations.add("data.observables", "has no velocities beside it; leave it out");
     }
     if message.count.is_some() && !matches!(measurements, Measurements::Moments { .. }) {
         let message = "is the number of velocities behind `mean` and `coefficient_of_variation`, and \
@@ -159,7 +162,12 @@ fn data_from_message(message: &v1::Data, violations: &mut Violations) -> Option<
 
 fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measurements> {
     let v1::Data { velocities, mean, coefficient_of_variation, groups, .. } = message;
-    let decays = |decays: &[f64]| (!decays.is_empty()).then(|| decays.to_vec());
+    let mut observables = |messages: &[v1::ObservedValues]| {
+        observed::columns_from_messages(messages).unwrap_or_else(|malformed| {
+            violations.add("data.observables", malformed.to_string());
+            ObservedColumns::default()
+        })
+    };
     let numbers = |subjects: &[u32]| (!subjects.is_empty()).then(|| numbered(subjects));
     match (velocities.is_empty(), groups.is_empty(), (*mean, *coefficient_of_variation)) {
         (true, true, (Some(mean), Some(coefficient_of_variation))) => {
@@ -168,22 +176,22 @@ fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measu
         }
         (false, true, (None, None)) => {
             let subjects = numbers(&message.subjects);
-            let decays = decays(&message.decays);
-            Some(Measurements::Velocities { velocities: velocities.clone(), subjects, decays })
+            let observables = observables(&message.observables);
+            Some(Measurements::Velocities { velocities: velocities.clone(), subjects, observables })
         }
         (true, false, (None, None)) => {
-            let group = |group: &v1::VelocityGroup| Group {
+            let mut group = |group: &v1::VelocityGroup| Group {
                 name: group.name.clone(),
                 velocities: group.velocities.clone(),
                 subjects: numbers(&group.subjects),
-                decays: decays(&group.decays),
+                observables: observables(&group.observables),
                 known: KnownQuantities::new([
                     group.bone_thickness,
                     group.bone_quality_factor,
                     group.coupling_sound_speed,
                 ]),
             };
-            Some(Measurements::Groups(groups.iter().map(group).collect()))
+            Some(Measurements::Groups(groups.iter().map(&mut group).collect()))
         }
         (true, true, (None, None)) => {
             violations.add(

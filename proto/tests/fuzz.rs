@@ -66,8 +66,8 @@ fn check_specification(bytes: &[u8]) {
 /// The evaluation at the start of a job.
 fn evaluation_of(job: &JobSpecification) -> evaluation::EvaluationInput {
     let (setup, point, germs) = (job.setup, job.start(), job.monte_carlo.germs());
-    let with_decays = job.has_decays();
-    evaluation::EvaluationInput { id: 7, setup, point, germs, random: job.random, with_decays }
+    let observables = job.observables();
+    evaluation::EvaluationInput { id: 7, setup, point, germs, random: job.random, observables }
 }
 
 fn evaluations() -> Vec<Vec<u8>> {
@@ -119,10 +119,9 @@ fn outcomes() -> Vec<Outcome> {
 }
 
 fn answers() -> Vec<Vec<u8>> {
-    let solve = |outcome: Outcome| RealizationResult {
-        outcome,
-        estimated_error: if outcome.is_ok() { 2e-5 } else { 0.0 },
-        decay: 0.0,
+    let solve = |outcome: Outcome| match outcome {
+        Ok(velocity) => RealizationResult::solved(velocity, 2e-5),
+        Err(kind) => RealizationResult::failed(kind),
     };
     let solved: Vec<_> = outcomes().into_iter().map(solve).collect();
     [1, 100]

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use osteon_common::inference::MomentWeights;
 use osteon_common::job::{JobSpecification, Objective, Range};
+use osteon_common::moments::{MOMENTS, ObservableEstimates};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::results::Status;
@@ -35,6 +36,8 @@ pub(crate) struct Finding<'a> {
     pub(crate) dispersion: Option<f64>,
     /// Moments of the model.
     pub(crate) velocity: &'a Velocity,
+    /// Other observables of the model that were measured.
+    pub(crate) observables: ObservableEstimates,
     pub(crate) data: Option<&'a Data>,
     /// Failed realizations by kind.
     pub(crate) failures: &'a BTreeMap<FailureKind, u64>,
@@ -82,6 +85,7 @@ impl<'a> Finding<'a> {
             parameters: &result.parameters,
             dispersion: result.dispersion,
             velocity: &result.velocity,
+            observables: result.observables,
             data: result.data.as_ref(),
             failures: &result.failures,
             identified: result.identified(),
@@ -113,6 +117,7 @@ impl<'a> Finding<'a> {
             parameters: &group.parameters,
             dispersion: group.dispersion,
             velocity: &group.velocity,
+            observables: group.observables,
             data: Some(&group.data),
             failures: &group.failures,
             identified: group.identified.as_ref(),
@@ -140,6 +145,7 @@ impl<'a> Finding<'a> {
             parameters: &result.parameters,
             dispersion: result.dispersion,
             velocity: &result.velocity,
+            observables: ObservableEstimates::default(),
             data: None,
             failures: &result.failures,
             identified: None,
@@ -172,21 +178,10 @@ impl<'a> Finding<'a> {
 
     /// Returns the value of a parameter at the best point, and where it is in the result.
     pub(crate) fn value(&self, parameter: Parameter) -> (Option<f64>, String) {
-        let model = self.parameters;
-        let value = match parameter {
-            Parameter::Dispersion => {
-                return (self.dispersion, format!("{}/dispersion", self.place));
-            }
-            Parameter::Density => model.density,
-            Parameter::LongitudinalYoungModulus => model.longitudinal_young_modulus,
-            Parameter::LongitudinalPoissonRatio => model.longitudinal_poisson_ratio,
-            Parameter::LongitudinalShearModulus => model.longitudinal_shear_modulus,
-            Parameter::TransverseYoungModulus => model.transverse_young_modulus,
-            Parameter::TransversePoissonRatio => model.transverse_poisson_ratio,
-            Parameter::BoneThickness => model.bone_thickness,
-            Parameter::BoneQualityFactor => model.bone_quality_factor,
-            Parameter::CouplingSoundSpeed => model.coupling_sound_speed,
-        };
+        if parameter == Parameter::Dispersion {
+            return (self.dispersion, format!("{}/dispersion", self.place));
+        }
+        let value = self.parameters.get(parameter);
         (value, format!("{}/parameters/{}", self.place, parameter.name()))
     }
 
@@ -199,18 +194,18 @@ impl<'a> Finding<'a> {
     /// a cost that does not depend on the moments alone.
     pub(crate) fn noise_level(&self) -> Option<f64> {
         let specification = self.specification();
-        if !specification.objective.is_of_moments()
-            || specification.has_priors()
-            || specification.has_decays()
-        {
+        if !specification.objective.is_of_moments() || specification.has_priors() {
             return None;
         }
         let (moments, errors) = (&self.velocity.moments, &self.velocity.standard_error);
-        let relative = [
-            errors.mean? / moments.mean?,
-            errors.coefficient_of_variation? / moments.coefficient_of_variation?,
-        ];
         let data = specification.data.as_ref();
+        let means = data.map(|data| data.compared(self.set).observables).unwrap_or_default();
+        let mut relative = [0.0; MOMENTS];
+        relative[0] = errors.mean? / moments.mean?;
+        relative[1] = errors.coefficient_of_variation? / moments.coefficient_of_variation?;
+        for (observable, found) in self.observables.present() {
+            relative[2 + observable as usize] = found.standard_error / means[observable]?;
+        }
         let weights = data
             .filter(|_| specification.objective == Objective::ChiSquare)
             .and_then(|data| MomentWeights::of_data(data, self.set));

@@ -66,49 +66,8 @@ impl Unit {
 
 /// Returns the unit in which a parameter is shown.
 pub(crate) fn unit(parameter: Parameter) -> Unit {
-    match parameter {
-        Parameter::Density => Unit { name: "kg/m³", size: 1.0 },
-        Parameter::LongitudinalYoungModulus
-        | Parameter::LongitudinalShearModulus
-        | Parameter::TransverseYoungModulus => Unit { name: "GPa", size: 1e9 },
-        Parameter::LongitudinalPoissonRatio
-        | Parameter::TransversePoissonRatio
-        | Parameter::Dispersion
-        | Parameter::BoneQualityFactor => NUMBER,
-        Parameter::BoneThickness => LENGTH,
-        Parameter::CouplingSoundSpeed => VELOCITY,
-    }
-}
-
-/// Returns the name of a parameter for people.
-pub(crate) fn words(parameter: Parameter) -> &'static str {
-    match parameter {
-        Parameter::Density => "density",
-        Parameter::LongitudinalYoungModulus => "longitudinal Young modulus",
-        Parameter::LongitudinalPoissonRatio => "longitudinal Poisson ratio",
-        Parameter::LongitudinalShearModulus => "longitudinal shear modulus",
-        Parameter::TransverseYoungModulus => "transverse Young modulus",
-        Parameter::TransversePoissonRatio => "transverse Poisson ratio",
-        Parameter::Dispersion => "dispersion",
-        Parameter::BoneThickness => "bone thickness",
-        Parameter::BoneQualityFactor => "bone quality factor",
-        Parameter::CouplingSoundSpeed => "speed of sound of the coupling layer",
-    }
-}
-
-pub(crate) fn symbol(parameter: Parameter) -> &'static str {
-    match parameter {
-        Parameter::Density => "ρ",
-        Parameter::LongitudinalYoungModulus => "e_L",
-        Parameter::LongitudinalPoissonRatio => "ν_L",
-        Parameter::LongitudinalShearModulus => "g_L",
-        Parameter::TransverseYoungModulus => "e_T",
-        Parameter::TransversePoissonRatio => "ν_T",
-        Parameter::Dispersion => "δ",
-        Parameter::BoneThickness => "h",
-        Parameter::BoneQualityFactor => "Q",
-        Parameter::CouplingSoundSpeed => "c₁",
-    }
+    let (name, size) = parameter.row().shown_in;
+    Unit { name, size }
 }
 
 /// Returns the name of a kind of failure for people.

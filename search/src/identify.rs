@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use osteon_common::job::JobSpecification;
+use osteon_common::observables::ObservableSet;
 use osteon_common::outcome::{FailureKind, RealizationResult, decode, encode};
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
@@ -29,8 +30,8 @@ pub struct Realizations {
     pub ensemble: Ensemble,
     /// Number of realizations.
     pub count: u64,
-    /// Whether the decay of each realization is needed; if not, it is 0.
-    pub with_decays: bool,
+    /// The observables that are needed of each realization; others are 0.
+    pub observables: ObservableSet,
 }
 
 /// Result and history of a job.
@@ -73,8 +74,8 @@ pub enum IdentifyError<E> {
     /// The caller returned an outcome that no realization can have.
     #[error(
         "realization {index} of evaluation {number} is {solved:?}; a velocity must be finite and above 0, \
-         its estimated error finite and at least 0, its decay finite (and not 0 if decays were measured), and \
-         both 0 where there is no velocity"
+         its estimated error finite and at least 0, its observables finite (and not 0 where the data have some), \
+         and all 0 where there is no velocity"
     )]
     Unsound {
         /// Number of the evaluation.
@@ -91,8 +92,7 @@ pub enum IdentifyError<E> {
 ///
 /// The result equals that of the same job submitted to a coordinator, to the bit, if `evaluate`
 /// computes what a worker computes; to do so, solve each bone with
-/// `osteon_solver::Solver::realization`, or, if [`Realizations::with_decays`], with
-/// `realization_with_decay`. Only the commit of the program is unknown here. An
+/// `osteon_solver::Solver::realization_with` and [`Realizations::observables`]. Only the commit of the program is unknown here. An
 /// identification follows the path of its search; a propagation is one evaluation at the start.
 ///
 /// ```
@@ -124,7 +124,7 @@ pub enum IdentifyError<E> {
 ///         let bone = realizations.ensemble.bone(index).expect("this dispersion is small");
 ///         (bone.elasticity.rows()[0][0] / bone.density).sqrt()
 ///     };
-///     let solved = |index| RealizationResult { outcome: Ok(speed(index)), estimated_error: 0.0, decay: 0.0 };
+///     let solved = |index| RealizationResult::solved(speed(index), 0.0);
 ///     Ok::<_, Infallible>((0..realizations.count).map(solved).collect())
 /// })?;
 /// assert_eq!(found.result.status, Status::Converged);
@@ -150,8 +150,8 @@ pub fn identify<E>(
             Step::Evaluate(point) => {
                 let number = search.evaluations();
                 let solved = solve(specification, number, point, &mut evaluate)?;
-                let with_decays = specification.has_decays();
-                let outcomes = Outcomes::of_results(solved.iter().copied(), with_decays);
+                let observables = specification.observables();
+                let outcomes = Outcomes::of_results(solved.iter().copied(), observables);
                 let successes = solved.iter().filter(|one| one.outcome.is_ok());
                 let errors = successes.map(|one| one.estimated_error);
                 search.tell(outcomes.clone(), quantile::estimated_error(errors));
@@ -171,18 +171,16 @@ fn solve<E>(
     evaluate: &mut impl FnMut(&Realizations) -> Result<Vec<RealizationResult>, E>,
 ) -> Result<Vec<RealizationResult>, IdentifyError<E>> {
     let count = specification.monte_carlo.realizations;
-    let with_decays = specification.has_decays();
+    let observables = specification.observables();
     let Ok(ensemble) = specification.ensemble(&point) else {
         return Ok((0..count).map(|_| RealizationResult::failed(FailureKind::NotFinite)).collect());
     };
-    let solved = evaluate(&Realizations { point, ensemble, count, with_decays })
+    let solved = evaluate(&Realizations { point, ensemble, count, observables })
         .map_err(|cause| IdentifyError::Evaluation { number, point: Box::new(point), cause })?;
     if solved.len() as u64 != count {
         return Err(IdentifyError::Count { number, found: solved.len(), expected: count });
     }
-    let lacks_decay =
-        |one: &RealizationResult| with_decays && one.outcome.is_ok() && one.decay.to_bits() == 0;
-    match solved.iter().position(|one| !is_sound(one) || lacks_decay(one)) {
+    match solved.iter().position(|one| !is_sound(one) || one.lacks_one(observables)) {
         Some(index) => Err(IdentifyError::Unsound { number, index, solved: solved[index] }),
         None => Ok(solved),
     }

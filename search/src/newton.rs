@@ -41,12 +41,12 @@ mod model;
 mod nearest;
 
 use osteon_common::inference::MomentWeights;
-use osteon_common::results::Moments;
+use osteon_common::moments::{ComparedMoments, MOMENTS, MomentVector};
 
 use crate::proposal::{Proposal, StopReason};
 use crate::search_box::SearchBox;
 
-use self::model::{Logarithms, Model, subtract};
+use self::model::{Model, subtract};
 use self::nearest::norm;
 
 pub use self::nearest::{Rows, nearest};
@@ -90,7 +90,7 @@ pub struct Settings {
 struct Evaluated {
     at: Vec<f64>,
     cost: f64,
-    found: Logarithms,
+    found: MomentVector,
 }
 
 /// The purpose of the pending point.
@@ -114,10 +114,11 @@ enum SlopeRefresh {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Newton {
     settings: Settings,
-    target: Logarithms,
-    /// The first axis of a parameter of the setup, which all come last. The closed form does not contain
-    /// them, so their slopes are always measured.
-    first_of_setup: usize,
+    data: ComparedMoments,
+    /// The first axis whose slopes are always measured: that of a parameter of the setup, which all come
+    /// last, because the closed form does not contain them; or the first of all, because it does not
+    /// contain other observables.
+    first_unknown: usize,
     /// Point from which distances are measured: the start, later a point near the solution.
     centre: Vec<f64>,
     /// Whether `centre` is near the solution.
@@ -147,13 +148,16 @@ pub struct Newton {
 impl Newton {
     /// Creates a search for the point of `space` nearest to its start whose moments are those of
     /// `data` (both above 0).
-    pub fn new(space: SearchBox, data: Moments, settings: Settings) -> Self {
+    pub fn new(space: SearchBox, data: ComparedMoments, settings: Settings) -> Self {
         let start = space.start();
-        let rule = [RULE_OF_THUMB, RULE_OF_THUMB / 14.0_f64.sqrt()].map(libm::log);
+        let mut rule = [0.0; MOMENTS];
+        rule[0] = libm::log(RULE_OF_THUMB);
+        rule[1] = libm::log(RULE_OF_THUMB / 14.0_f64.sqrt());
+        let has_observables = !data.observables.set().is_empty();
         let mut newton = Self {
             settings,
-            target: logarithms(data),
-            first_of_setup: space.first_of_setup(),
+            data,
+            first_unknown: if has_observables { 0 } else { space.first_of_setup() },
             model: Model::new(space, start.clone(), rule),
             weights: None,
             base: None,
@@ -208,13 +212,14 @@ impl Newton {
 
     /// Takes the cost and the moments of the pending point; if the cost or the logarithm of a
     /// moment is not finite, the point is infeasible. Ignored once stopped.
-    pub fn tell(&mut self, cost: f64, moments: Option<Moments>) {
+    pub fn tell(&mut self, cost: f64, moments: Option<ComparedMoments>) {
         if self.stop.is_some() {
             return;
         }
         self.evaluations += 1;
         let at = self.pending.clone();
-        let found = moments.map(logarithms).filter(|found| found.iter().all(|y| y.is_finite()));
+        let found = moments.map(|moments| moments.in_logarithms(&self.data));
+        let found = found.filter(|found| found.iter().all(|y| y.is_finite()));
         let feasible = cost.is_finite();
         self.take(found.filter(|_| feasible).map(|found| Evaluated { at, cost, found }));
         self.stop_when_used_up();
@@ -302,21 +307,21 @@ impl Newton {
         } else {
             self.radius = 0.5 * length;
         }
-        if is_first && self.first_of_setup < self.centre.len() {
-            self.measure_from(self.first_of_setup);
+        if is_first && self.first_unknown < self.centre.len() {
+            self.measure_from(self.first_unknown);
             return;
         }
         self.next_step(!halved && length <= self.settings.size_tolerance);
     }
 
-    /// Returns whether both moments nearly match.
+    /// Returns whether all moments nearly match.
     fn is_near(&self, trial: &Evaluated) -> bool {
-        let square = |axis: usize| {
-            let difference = trial.found[axis] - self.target[axis];
+        let squares = trial.found.iter().zip(self.target()).map(|(one, other)| {
+            let difference = one - other;
             difference * difference
-        };
+        });
         match self.weights {
-            Some(_) => square(0) + square(1) < NEAR,
+            Some(_) => squares.sum::<f64>() < NEAR,
             None => trial.cost < NEAR,
         }
     }
@@ -354,10 +359,15 @@ impl Newton {
     /// unlimited.
     fn model_solution(&self) -> Vec<f64> {
         if self.near {
-            self.model.nearest_from_here(&self.centre, self.target)
+            self.model.nearest_from_here(&self.centre, self.target())
         } else {
-            self.model.nearest(&self.centre, self.target)
+            self.model.nearest(&self.centre, self.target())
         }
+    }
+
+    /// Returns the data's moments, in the coordinates of the model's.
+    fn target(&self) -> MomentVector {
+        self.data.in_logarithms(&self.data)
     }
 
     /// Refreshes the slopes without an evaluation by resetting them. If that was already done, or
@@ -374,7 +384,7 @@ impl Newton {
         }
         self.radius = RADIUS_MAX;
         self.slow_evaluations = 0;
-        let all_in_closed_form = self.first_of_setup == self.centre.len();
+        let all_in_closed_form = self.first_unknown == self.centre.len();
         let may_reset = all_in_closed_form && self.slope_refresh == SlopeRefresh::None;
         if may_reset && self.model.reset_slopes() {
             self.slope_refresh = SlopeRefresh::Reset;
@@ -433,9 +443,4 @@ impl Newton {
     fn base_point(&self) -> &[f64] {
         self.base.as_ref().map_or(&self.centre, |base| &base.at)
     }
-}
-
-/// Returns the logarithms of mean velocity (m/s) and coefficient of variation.
-pub(crate) fn logarithms(moments: Moments) -> [f64; 2] {
-    [moments.mean, moments.coefficient_of_variation].map(libm::log)
 }

@@ -1,7 +1,8 @@
 //! The posterior of the free parameters: which points to evaluate, and what follows from them.
 //!
-//! The data's likelihood depends on the two moments of the model's velocities alone, and these are
-//! smooth functions of the parameters that a closed form nearly gives. So the model is evaluated at
+//! The data's likelihood depends on the two moments of the model's velocities, and on the means of the
+//! other observables that were measured. These are smooth functions of the parameters, and a closed form
+//! nearly gives those of the velocities. So the model is evaluated at
 //! some hundred points, its moments are interpolated (`surrogate.rs`), and the posterior of the
 //! interpolated model is drawn by importance sampling (`population.rs`), at next to no cost. Fresh
 //! draws are evaluated, batch by batch: the ratio of the evaluated density to the interpolated one
@@ -24,6 +25,7 @@ mod check;
 mod cholesky;
 mod density;
 mod features;
+mod likelihood;
 mod moments_grid;
 mod pareto;
 mod pivot;
@@ -34,31 +36,15 @@ mod surrogate;
 #[cfg(test)]
 mod tests;
 
-use osteon_common::data_likelihood::DataLikelihood;
-use osteon_common::job::{JobSpecification, Measurements};
+use osteon_common::inference::model_errors;
+use osteon_common::job::JobSpecification;
 use osteon_common::posterior::Posterior;
-use osteon_common::results::{BestPoint, Evaluation, Moments};
+use osteon_common::results::{BestPoint, ComparedMoments, Evaluation};
 
 pub(crate) use self::batches::{PosteriorSearch, SearchOutcome};
 pub use self::density::PosteriorDensity;
+pub(crate) use self::likelihood::SetLikelihood;
 pub(crate) use self::population::closed_form;
-
-/// Returns the likelihood of set number `set` of the data; `None` if their noise is unknown.
-pub(crate) fn likelihood(specification: &JobSpecification, set: usize) -> Option<DataLikelihood> {
-    let data = specification.data.as_ref()?;
-    let instrument = data.repeatability;
-    match (&data.measurements, data.velocities(set), data.subjects(set)) {
-        (&Measurements::Moments { mean, coefficient_of_variation, count }, ..) => {
-            let moments = Moments { mean, coefficient_of_variation };
-            DataLikelihood::from_moments(moments, count?, instrument)
-        }
-        (_, Some(velocities), Some(subjects)) => {
-            DataLikelihood::of_subjects(velocities, subjects, instrument)
-        }
-        (_, Some(velocities), None) => DataLikelihood::independent(velocities, instrument),
-        (_, None, _) => None,
-    }
-}
 
 /// Returns the posterior of set number `set` of the data, given the best point of its search and all
 /// evaluations of the job; `None` if the job asks for none, or its evaluations are not complete.
@@ -73,19 +59,19 @@ pub(crate) fn posterior(
     let known = rows()
         .filter(|row| !row.role.posterior)
         .filter_map(|row| Some((row.point, feasible_moments(row)?)));
-    let likelihood = likelihood(specification, set);
+    let likelihood = SetLikelihood::new(specification, set);
     let mut search = PosteriorSearch::new(&specification.of_set(set), likelihood, known);
     for row in rows().filter(|row| row.role.posterior) {
         search.tell(feasible_moments(row));
     }
-    let errors = best.and_then(|best| best.velocity).map(|velocity| velocity.relative_errors());
-    let found = search.result(specification, errors?)?;
-    let predictive_p_value =
-        best.and_then(|best| summary::predictive_p_value(specification, set, best, &found));
+    let (data, best) = (specification.data.as_ref()?, best?);
+    let errors = model_errors(&data.compared(set), &best.velocity?, &best.observables);
+    let found = search.result(specification, errors)?;
+    let predictive_p_value = summary::predictive_p_value(specification, set, best, &found);
     Some(Posterior { predictive_p_value, ..found })
 }
 
 /// Returns the moments of an evaluation, if it is feasible.
-pub(crate) fn feasible_moments(row: &Evaluation) -> Option<Moments> {
-    row.moments.filter(|_| row.cost.is_some_and(f64::is_finite))
+pub(crate) fn feasible_moments(row: &Evaluation) -> Option<ComparedMoments> {
+    row.compared().filter(|_| row.cost.is_some_and(f64::is_finite))
 }

@@ -10,6 +10,7 @@ use osteon_common::data_statistics::{FittedMoments, kolmogorov_test};
 use osteon_common::digest::PathDigest;
 use osteon_common::inference::{Agreement, Conclusions, agreement, below_noise_from, meaning};
 use osteon_common::job::{Data, JobKind, JobSpecification, Objective};
+use osteon_common::observables::ObservableSet;
 use osteon_common::outcome::FailureCounts;
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
@@ -251,7 +252,7 @@ impl Search {
             role: EvaluationRole::default(),
             point,
             moments: assessment.statistics.moments,
-            decay: assessment.statistics.decay,
+            observables: assessment.statistics.observables,
             cost: assessment.cost,
             failures: FailureCounts::from_outcomes(&assessment.outcomes),
             estimated_error: None,
@@ -317,9 +318,9 @@ impl Search {
         summary.result(&self.specification, ending, program, best, Vec::new())
     }
 
-    /// Returns whether the decay of each realization is needed.
-    pub fn has_decays(&self) -> bool {
-        self.specification.has_decays()
+    /// Returns the observables that are needed of each realization.
+    pub fn observables(&self) -> ObservableSet {
+        self.specification.observables()
     }
 
     /// Returns whether the data are groups.
@@ -374,11 +375,11 @@ impl Summary {
         });
         let by_likelihood = measured.filter(|_| *objective == Objective::Likelihood);
         let velocity = statistics::estimate(monte_carlo, &row.point, outcomes);
-        let decay = statistics::decay_estimate(monte_carlo, outcomes);
+        let observables = statistics::observable_estimates(monte_carlo, outcomes);
         let set = row.role.group as usize;
-        let agreement = velocity.as_ref().and_then(|velocity| {
-            agreement(specification, set, &row.point, velocity, decay.as_ref())
-        });
+        let agreement = velocity
+            .as_ref()
+            .and_then(|velocity| agreement(specification, set, &row.point, velocity, &observables));
         // Moments that the search could not match are not fitted.
         let fitted = match (objective, agreement) {
             (Objective::Likelihood, _) | (_, Some(Agreement { matched: true, .. })) => {
@@ -395,7 +396,7 @@ impl Summary {
             cost_error: by_likelihood
                 .and_then(|measured| likelihood_error(monte_carlo, &row.point, outcomes, measured)),
             velocity,
-            decay,
+            observables,
             failure_bias: statistics::failure_bias(monte_carlo, &row.point, outcomes),
             kolmogorov: tested.and_then(|set| {
                 kolmogorov_test(set.velocities, outcomes, monte_carlo.sampling, fitted)

@@ -3,6 +3,7 @@
 use std::f64::consts::LN_10;
 
 use osteon_common::case::{Bone, Setup};
+use osteon_common::observables::{Observable, ObservableSet, PerObservable};
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::Ensemble;
 use osteon_common::settings::{Extremum, Picking};
@@ -42,26 +43,52 @@ pub struct ObservedRealization {
 }
 
 impl Solver {
-    /// Computes realization `index` of an ensemble as [`Solver::realization`] does, and its decay, which
-    /// takes no further pass. If the decay is not finite, the realization fails as `not_finite`.
-    pub fn realization_with_decay(
+    /// Computes a realization as [`Solver::realization`] does, and these observables of it. The decay takes
+    /// no further pass, the others a second one. A realization that lacks one of them is a failure: of the
+    /// kind of the other extremum's, or `not_finite`.
+    pub fn realization_with(
         &self,
+        observables: ObservableSet,
         ensemble: &Ensemble,
         index: u64,
         workspace: &mut Workspace,
     ) -> RealizationResult {
-        let arrival = match self.arrival_of(ensemble, index, workspace) {
-            Ok(arrival) => arrival,
-            Err(kind) => return RealizationResult::failed(kind),
-        };
-        // A random setup never moves receivers along the probe, and a tilt turns them with it.
-        let distances: Vec<f64> = self.setup().probe.distances().collect();
-        let Arrival { velocity, estimated_error, amplitudes, .. } = arrival;
-        let decay = decay(&distances, &amplitudes);
-        if !decay.is_finite() {
-            return RealizationResult::failed(FailureKind::NotFinite);
+        match self.with_observables(observables, ensemble, index, workspace) {
+            Ok(solved) if solved.invalid_observable().is_none() => solved,
+            Ok(_) => RealizationResult::failed(FailureKind::NotFinite),
+            Err(kind) => RealizationResult::failed(kind),
         }
-        RealizationResult { outcome: Ok(velocity), estimated_error, decay }
+    }
+
+    fn with_observables(
+        &self,
+        observables: ObservableSet,
+        ensemble: &Ensemble,
+        index: u64,
+        workspace: &mut Workspace,
+    ) -> Result<RealizationResult, FailureKind> {
+        let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
+        let own = ensemble.own_setup(index, self.setup()).map(|own| self.with_setup(&own));
+        let solver = own.as_ref().unwrap_or(self);
+        let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
+        let needs_other =
+            observables[Observable::OtherVelocity] || observables[Observable::CenterFrequency];
+        let other = match needs_other {
+            true => Some(solver.other_arrival(&bone, workspace).map_err(|failure| failure.kind)?),
+            false => None,
+        };
+        let value = |observable| match (observable, &other) {
+            (Observable::Decay, _) => solver.decay(&arrival),
+            (Observable::OtherVelocity, Some(other)) => other.velocity,
+            (Observable::CenterFrequency, Some(other)) => {
+                frequency(&arrival, other).unwrap_or(f64::NAN)
+            }
+            (Observable::OtherVelocity | Observable::CenterFrequency, None) => 0.0,
+        };
+        Ok(RealizationResult {
+            observables: PerObservable::new(|one| if observables[one] { value(one) } else { 0.0 }),
+            ..RealizationResult::solved(arrival.velocity, arrival.estimated_error)
+        })
     }
 
     /// Computes all observables of realization `index` of an ensemble.
@@ -90,17 +117,27 @@ impl Solver {
         arrival: &Arrival,
         workspace: &mut Workspace,
     ) -> FirstSignal {
-        let setup = self.setup();
-        let other_extremum = setup.picking.extremum.other();
-        let picking = Picking { extremum: other_extremum, ..setup.picking };
-        let other = self.with_setup(&Setup { picking, ..*setup }).arrival(bone, workspace);
-        let distances: Vec<f64> = setup.probe.distances().collect();
+        let other = self.other_arrival(bone, workspace);
         FirstSignal {
-            other_extremum,
-            decay: decay(&distances, &arrival.amplitudes),
+            other_extremum: self.setup().picking.extremum.other(),
+            decay: self.decay(arrival),
             center_frequency: other.as_ref().ok().and_then(|other| frequency(arrival, other)),
             other_velocity: other.map(|other| other.velocity),
         }
+    }
+
+    /// Returns the arrival of the extremum that the case does not pick.
+    fn other_arrival(&self, bone: &Bone, workspace: &mut Workspace) -> Result<Arrival, Failure> {
+        let setup = self.setup();
+        let picking = Picking { extremum: setup.picking.extremum.other(), ..setup.picking };
+        self.with_setup(&Setup { picking, ..*setup }).arrival(bone, workspace)
+    }
+
+    /// Returns the decay of an arrival along the array, dB/cm.
+    fn decay(&self, arrival: &Arrival) -> f64 {
+        // A random setup never moves receivers along the probe, and its tilt turns them with it.
+        let distances: Vec<f64> = self.setup().probe.distances().collect();
+        decay(&distances, &arrival.amplitudes)
     }
 }
 

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use osteon_common::case::{Bone, Setup};
-use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
+use osteon_common::observables::ObservableSet;
+use osteon_common::outcome::{Outcome, RealizationResult};
 use osteon_common::realization::Ensemble;
 use osteon_common::settings::Method;
 
@@ -150,26 +151,6 @@ impl Solver {
         index: u64,
         workspace: &mut Workspace,
     ) -> RealizationResult {
-        match self.arrival_of(ensemble, index, workspace) {
-            Ok(Arrival { velocity, estimated_error, .. }) => {
-                RealizationResult { outcome: Ok(velocity), estimated_error, decay: 0.0 }
-            }
-            Err(kind) => RealizationResult::failed(kind),
-        }
-    }
-
-    /// Computes the arrival of the realization at `index` of `ensemble`.
-    pub(crate) fn arrival_of(
-        &self,
-        ensemble: &Ensemble,
-        index: u64,
-        workspace: &mut Workspace,
-    ) -> Result<Arrival, FailureKind> {
-        let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
-        let arrival = match ensemble.own_setup(index, &self.setup) {
-            Some(own) => self.with_setup(&own).arrival(&bone, workspace),
-            None => self.arrival(&bone, workspace),
-        };
-        arrival.map_err(|failure| failure.kind)
+        self.realization_with(ObservableSet::NONE, ensemble, index, workspace)
     }
 }

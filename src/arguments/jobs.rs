@@ -31,6 +31,23 @@ pub(crate) enum JobCommand {
     Prune(PruneArguments),
 }
 
+impl JobCommand {
+    /// Returns what says where the coordinator is.
+    pub(crate) fn client(&self) -> ClientArguments {
+        let client = match self {
+            Self::Submit(SubmitArguments { client, .. })
+            | Self::List(JobListArguments { client, .. })
+            | Self::Watch(WatchArguments { job: JobArguments { client, .. }, .. })
+            | Self::Explain(ExplainArguments { client, .. })
+            | Self::Cancel(JobArguments { client, .. })
+            | Self::Fetch(FetchArguments { client, .. })
+            | Self::Recheck(WatchArguments { job: JobArguments { client, .. }, .. })
+            | Self::Prune(PruneArguments { client, .. }) => client,
+        };
+        client.clone()
+    }
+}
+
 /// The commands about jobs by the names that they had before; they do the same.
 #[derive(Debug, Subcommand)]
 pub(crate) enum EarlierCommand {

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{ClientArguments, ScalingArguments, probe_seconds};
+use super::{ClientArguments, probe_seconds};
+use crate::wings::WorkersWing;
 
 /// Arguments of `workers`.
 #[derive(Debug, Args)]
@@ -27,11 +28,9 @@ pub(crate) enum WorkersCommand {
     Drain(DrainArguments),
     /// Lift the ban of a host whose machine has been repaired, so that its workers may attach again
     Unban(UnbanArguments),
-    /// Submit workers to Slurm as long as jobs wait for them, until interrupted
-    ///
-    /// Workers end by themselves when they have had no work for the idle timeout. Those that wait in
-    /// Slurm's queue while there is no work are cancelled after the same time.
-    Slurm(Box<ScalingArguments>),
+    /// Operations of wings.
+    #[command(flatten)]
+    Wing(WorkersWing),
 }
 
 /// Arguments of `workers unban`.

@@ -9,9 +9,7 @@ use osteon_coordinator::ListenAddress;
 use osteon_proto::endpoint::Endpoint;
 
 use super::{CredentialArguments, age, seconds};
-
-/// Maximum length of the name of a host (RFC 1035).
-const HOST_NAME_BYTES_MAX: usize = 253;
+use crate::wings::PageOptions;
 
 /// Arguments of `coordinator`.
 #[derive(Debug, Args)]
@@ -69,15 +67,9 @@ pub(crate) struct CoordinatorArguments {
     /// written to DIR/metrics-address [default: none]
     #[arg(long, value_name = "ADDR", value_parser = tcp_address)]
     pub(crate) metrics: Option<SocketAddr>,
-    /// Serve the live page at ADDR (IP:PORT; port 0 selects a free port), with the coordinator's
-    /// certificates and for the holders of its tokens. Its URL is written to DIR/http-address
-    /// [default: none]
-    #[arg(long, value_name = "ADDR", value_parser = page_address)]
-    pub(crate) http: Option<SocketAddr>,
-    /// Answer browsers that ask for the live page by this name, too, e.g. that of a proxy. Only
-    /// needed without tokens; can be repeated
-    #[arg(long, value_name = "NAME", requires = "http", value_parser = host_name)]
-    pub(crate) http_host: Vec<String>,
+    /// The live page.
+    #[command(flatten)]
+    pub(crate) page: PageOptions,
     /// Format of the log on stderr
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t = LogFormat::Text)]
     pub(crate) log_format: LogFormat,
@@ -135,19 +127,8 @@ fn tcp_address(text: &str) -> Result<SocketAddr, String> {
     only_tcp(text, "Prometheus")
 }
 
-fn page_address(text: &str) -> Result<SocketAddr, String> {
-    only_tcp(text, "a browser")
-}
-
-/// Reads the address of the page of a run, which has no certificates.
-pub(super) fn own_page_address(text: &str) -> Result<SocketAddr, String> {
-    let address = page_address(text)?;
-    let advice = "a run shows its page on this machine only; write 127.0.0.1:PORT or [::1]:PORT, and \
-                  reach it from elsewhere by ssh -L";
-    if address.ip().is_loopback() { Ok(address) } else { Err(advice.to_owned()) }
-}
-
-fn only_tcp(text: &str, reader: &str) -> Result<SocketAddr, String> {
+/// Reads an address for `reader`, which cannot use a Unix socket.
+pub(crate) fn only_tcp(text: &str, reader: &str) -> Result<SocketAddr, String> {
     match text.parse() {
         Ok(ListenAddress::Tcp(address)) => Ok(address),
         Ok(ListenAddress::Unix(_)) => {
@@ -155,16 +136,6 @@ fn only_tcp(text: &str, reader: &str) -> Result<SocketAddr, String> {
         }
         Err(error) => Err(error.to_string()),
     }
-}
-
-pub(super) fn host_name(text: &str) -> Result<String, String> {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
-    if text.is_empty() || text.len() > HOST_NAME_BYTES_MAX || !text.chars().all(allowed) {
-        return Err(
-            "it must be the name of a host without a port, such as bones.example.org".to_owned()
-        );
-    }
-    Ok(text.to_owned())
 }
 
 fn fraction(text: &str) -> Result<f64, String> {

@@ -5,10 +5,10 @@ use osteon_files::job_file::{self, FilePurpose};
 use osteon_solver::Isa;
 
 use crate::arguments::CheckArguments;
-use crate::cost::{Effort, JobCost};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output::{self, ShownCost};
 use crate::{resolved, unsearched_groups, warnings};
+use osteon_local::cost::{Effort, JobCost};
 
 /// Checks the job, and prints what it will do and cost.
 pub(super) async fn check(

@@ -9,9 +9,7 @@ use osteon_client::result_files;
 use osteon_common::visible;
 use osteon_coordinator::service::open_files;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
-use osteon_coordinator::{
-    BindError, Config, Coordinator, ListenAddress, MetricsListener, PageBindError,
-};
+use osteon_coordinator::{BindError, Config, Coordinator, ListenAddress, MetricsListener};
 
 use crate::arguments::CoordinatorArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
@@ -54,13 +52,7 @@ pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus,
             listener.with_metrics(metrics)
         }
     };
-    let listener = match arguments.http {
-        None => listener,
-        Some(address) => {
-            let hosts = arguments.http_host.clone();
-            listener.with_page(address, arguments.insecure, hosts).await.map_err(page_failure)?
-        }
-    };
+    let listener = arguments.page.add_to(listener, arguments.insecure).await?;
     let listener = listener.with_spans(telemetry::recorder());
     let lost = if arguments.accept_lost_jobs { LostJobs::Accept } else { LostJobs::Refuse };
     let store = SqliteStore::open_with(&directory, lost).map_err(CommandFailure::failed)?;
@@ -154,12 +146,5 @@ fn bind_failure(error: BindError) -> CommandFailure {
     match error {
         BindError::NotLoopback { .. } => CommandFailure::bad_input(error),
         _ => CommandFailure::failed(error),
-    }
-}
-
-fn page_failure(error: PageBindError) -> CommandFailure {
-    match error {
-        PageBindError::Refused { .. } => CommandFailure::failed(error),
-        _ => CommandFailure::bad_input(error),
     }
 }

@@ -16,51 +16,80 @@ use osteon_files::report::ResultFile;
 use osteon_proto::v1::JobSnapshot;
 use tonic::Code;
 
-use crate::arguments::JobFileArguments;
+use crate::arguments::{
+    ExplainArguments, FetchArguments, JobArguments, JobCommand, PruneArguments, SubmitArguments,
+    WatchArguments,
+};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::progress::say;
-use crate::resolved::OutputFormat;
+use crate::resolved::{OutputFormat, format};
 use crate::user;
 use crate::{unsearched_groups, warnings};
 
 /// Shortest time between two lines of `watch`.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
 
-/// A job to be submitted to a coordinator.
-pub(super) struct Submission<'a> {
-    /// The job file.
-    pub(super) job: &'a JobFileArguments,
-    /// Kind of the job.
-    pub(super) kind: JobKind,
-    /// The request, which makes the submission idempotent.
-    pub(super) request: &'a RequestId,
-    /// Further properties of the job.
-    pub(super) options: SubmitOptions,
+/// Returns what is said of what an interrupted command leaves behind.
+pub(super) fn left_by_interruption(command: &JobCommand) -> &'static str {
+    match command {
+        JobCommand::List(_) | JobCommand::Explain(_) => "nothing was changed",
+        JobCommand::Submit(_) => "the job may have been accepted (see `osteon job list`)",
+        JobCommand::Prune(_) => "jobs may have been deleted (see `osteon job list`)",
+        JobCommand::Watch(_) => "the job continues (see `osteon job list`, `osteon job cancel`)",
+        JobCommand::Recheck(_) => "the job may be computed again (see `osteon job list`)",
+        JobCommand::Cancel(_) => "the job may have been cancelled (see `osteon job list`)",
+        JobCommand::Fetch(_) => "run the same command again to fetch the results",
+    }
+}
+
+/// Executes a command about jobs.
+pub(super) async fn perform(
+    command: JobCommand,
+    coordinator: &Remote,
+) -> Result<ExitStatus, CommandFailure> {
+    match command {
+        JobCommand::Submit(arguments) => submit(arguments, coordinator).await,
+        JobCommand::List(arguments) => list(coordinator, format(arguments.json)).await,
+        JobCommand::Watch(WatchArguments { job, json }) => {
+            watch(&job.job, coordinator, format(json)).await
+        }
+        JobCommand::Explain(ExplainArguments { job, json, .. }) => {
+            explain(&job, coordinator, format(json)).await
+        }
+        JobCommand::Cancel(JobArguments { job, .. }) => cancel(&job, coordinator).await,
+        JobCommand::Fetch(FetchArguments { job, out, .. }) => fetch(&job, coordinator, &out).await,
+        JobCommand::Recheck(WatchArguments { job, json }) => {
+            recheck(&job.job, coordinator, format(json)).await
+        }
+        JobCommand::Prune(arguments) => prune(arguments, coordinator).await,
+    }
 }
 
 /// `submit`: prints the job's id.
-pub(super) async fn submit(
-    submission: Submission<'_>,
+async fn submit(
+    arguments: SubmitArguments,
     coordinator: &Remote,
-    format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
-    let Submission { job, kind, request, options } = submission;
+    let SubmitArguments { job, propagate, request_id, name, priority, json, .. } = arguments;
+    let request = match request_id {
+        None => RequestId::new().map_err(CommandFailure::failed)?,
+        Some(id) => RequestId::with_id(id),
+    };
+    let kind = if propagate { JobKind::Propagation } else { JobKind::Identification };
     let input = job.open().map_err(CommandFailure::bad_input)?;
     let noted = job_file::of_input(&input, kind).map_err(CommandFailure::bad_input)?;
     unsearched_groups::warn(input.path(), &noted);
     warnings::say_of_job(&noted.specification, &noted.warnings).await;
     let mut client = user::connect(coordinator).await?;
-    let id = client.submit(&noted.specification, request, options).await?;
-    output::stdout(format).submitted(&id).map_err(stdout_failure)?;
+    let options = SubmitOptions { priority, name: name.unwrap_or_default() };
+    let id = client.submit(&noted.specification, &request, options).await?;
+    output::stdout(format(json)).submitted(&id).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
 /// `list`: prints all jobs, and the workers that are banned.
-pub(super) async fn list(
-    coordinator: &Remote,
-    format: OutputFormat,
-) -> Result<ExitStatus, CommandFailure> {
+async fn list(coordinator: &Remote, format: OutputFormat) -> Result<ExitStatus, CommandFailure> {
     let mut client = user::connect(coordinator).await?;
     let (jobs, concerns) = client.list_with_concerns().await?;
     let banned = client.banned().await?;
@@ -72,19 +101,18 @@ pub(super) async fn list(
 }
 
 /// `jobs prune`: prints the ids of the deleted jobs.
-pub(super) async fn prune(
-    older_than: Option<Duration>,
-    keep_last: Option<u64>,
+async fn prune(
+    arguments: PruneArguments,
     coordinator: &Remote,
-    format: OutputFormat,
 ) -> Result<ExitStatus, CommandFailure> {
+    let PruneArguments { older_than, keep_last, json, .. } = arguments;
     let jobs = user::connect(coordinator).await?.prune(older_than, keep_last).await?;
-    output::stdout(format).pruned(&jobs).map_err(stdout_failure)?;
+    output::stdout(format(json)).pruned(&jobs).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
 /// `watch`: prints a line when the job changes, at most one a second, until it has ended.
-pub(super) async fn watch(
+async fn watch(
     job: &str,
     coordinator: &Remote,
     format: OutputFormat,
@@ -107,7 +135,7 @@ pub(super) async fn watch(
 
 /// `recheck`: computes a job again that a banned host contributed to, and follows it to its end, which says
 /// whether its result has changed.
-pub(super) async fn recheck(
+async fn recheck(
     job: &str,
     coordinator: &Remote,
     format: OutputFormat,
@@ -117,7 +145,7 @@ pub(super) async fn recheck(
 }
 
 /// `explain`: prints what decides how fast a job is.
-pub(super) async fn explain(
+async fn explain(
     job: &str,
     coordinator: &Remote,
     format: OutputFormat,
@@ -128,18 +156,14 @@ pub(super) async fn explain(
 }
 
 /// `cancel`: prints the job's state afterwards.
-pub(super) async fn cancel(job: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
+async fn cancel(job: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
     let snapshot = user::connect(coordinator).await?.cancel(job).await?;
     output::stdout(OutputFormat::Text).snapshot(&snapshot).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
 /// `fetch`: writes the results of an ended job. Nothing is written while it has not ended.
-pub(super) async fn fetch(
-    job: &str,
-    coordinator: &Remote,
-    out: &Path,
-) -> Result<ExitStatus, CommandFailure> {
+async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result<ExitStatus, CommandFailure> {
     let fetched =
         user::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
             ClientError::Refused { code: Code::FailedPrecondition, reason, .. } => {

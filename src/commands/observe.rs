@@ -1,5 +1,6 @@
 //! `observe`: all observables of a job's realizations.
 
+use indicatif::{ProgressBar, ProgressStyle};
 use osteon_common::job::JobKind;
 use osteon_files::job_file;
 use osteon_solver::Isa;
@@ -8,9 +9,12 @@ use crate::arguments::ObserveArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::job_point;
 use crate::new_files::{self, NewFile};
-use crate::observations::Observations;
 use crate::output::{self, ShownObservations};
 use crate::resolved;
+use osteon_local::observations::{ObservationError, Observations};
+
+/// Progress on a terminal.
+const BAR: &str = "{bar:30} {pos} of {len} realizations, {eta} left";
 
 /// Computes the realizations, writes their rows if requested, and prints the summary.
 pub(super) async fn observe(
@@ -27,9 +31,20 @@ pub(super) async fn observe(
     if let Some(out) = &out {
         new_files::refuse_existing(out)?;
     }
-    let compute = move || Observations::compute(&specification, &point, isa, threads as usize);
-    let computed = tokio::task::spawn_blocking(compute).await;
-    let observations = computed.map_err(CommandFailure::failed)??;
+    let style = ProgressStyle::with_template(BAR).map_err(CommandFailure::failed)?;
+    let compute = move || {
+        // Hidden unless stderr is a terminal.
+        let bar = ProgressBar::new(specification.monte_carlo.realizations).with_style(style);
+        let done = || bar.inc(1);
+        let computed = Observations::compute(&specification, &point, isa, threads as usize, done);
+        bar.finish_and_clear();
+        computed
+    };
+    let computed = tokio::task::spawn_blocking(compute).await.map_err(CommandFailure::failed)?;
+    let observations = computed.map_err(|error| match error {
+        ObservationError::Point(_) => CommandFailure::bad_input(error),
+        ObservationError::Threads(_) => CommandFailure::failed(error),
+    })?;
     if let Some(path) = &out {
         let text = observations.to_csv();
         new_files::create(&[NewFile { path: path.clone(), text: text.into(), secret: false }])?;

@@ -20,11 +20,12 @@ use osteon_solver::Isa;
 use crate::arguments::VerbosityArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, Interruption, stdout_failure};
 use crate::output::{self, Detail, ShownResult};
+use crate::process_context::RunLocation;
 use crate::progress::{Progress, ShownProgress, say};
-use crate::resolved::{Run, RunLocation};
+use crate::resolved::Run;
 use crate::signals;
 use crate::user;
-use crate::{cost, program, report_directory, unsearched_groups, warnings};
+use crate::{cost, program, unsearched_groups, warnings};
 
 /// Runs the job, or shows the result of an earlier run.
 pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, CommandFailure> {
@@ -150,9 +151,7 @@ fn show(
     };
     let shown = ShownResult { specification, result, directory: run.out.as_deref(), detail };
     output::stdout(run.format).result(&shown).map_err(stdout_failure)?;
-    if let Some(directory) = run.out.as_deref().filter(|_| run.report) {
-        report_directory::write_beside(directory)?;
-    }
+    run.report.write(run.out.as_deref())?;
     Ok(ExitStatus::of_result(specification, result))
 }
 

@@ -3,24 +3,22 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
+use osteon_client::simulation_directory::{SimulationKey, TRACES};
 use osteon_common::case::{Case, Setup};
 use osteon_common::sampling::NominalSampling;
 use osteon_common::warnings::case_warnings;
 use osteon_files::case_file;
+use osteon_local::simulation::SolvedCase;
 use osteon_solver::check::Check;
-use osteon_solver::{
-    Arrival, FirstSignal, GuidedWaves, Isa, Solver, TraceError, Traces, Workspace,
-};
-
+use osteon_solver::{Isa, Solver, TraceError, Traces};
 use tokio::task::JoinHandle;
 
 use crate::arguments::SimulateArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output::{self, ShownSimulation};
+use crate::program;
 use crate::progress::say;
-use crate::report_directory;
 use crate::resolved;
-use crate::simulation_directory::{SimulationKey, TRACES};
 use crate::warnings;
 
 /// Time without a word, at first and later.
@@ -38,21 +36,12 @@ pub(super) async fn simulate(
     warnings::say_all(&case_warnings(&case));
     let traces = arguments.out.as_ref().map(|directory| directory.join(TRACES));
     let setup = case.setup;
-    let reported = arguments.out.clone().filter(|_| arguments.report);
+    let (report, out) = (arguments.report.clone(), arguments.out.clone());
     let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments, isa));
     let solved = said_while(solved, &setup).await.map_err(CommandFailure::failed)??;
-    let shown = ShownSimulation {
-        setup: &setup,
-        arrival: &solved.arrival,
-        first_signal: solved.first_signal.as_ref(),
-        guided_waves: &solved.guided_waves,
-        traces: traces.as_deref(),
-        check: solved.check.as_ref(),
-    };
+    let shown = ShownSimulation { solved: &solved, traces: traces.as_deref() };
     output::stdout(format).simulation(&shown).map_err(stdout_failure)?;
-    if let Some(directory) = reported {
-        report_directory::write_beside(&directory)?;
-    }
+    report.write(out.as_deref())?;
     let passed = solved.check.as_ref().is_none_or(Check::passed);
     Ok(if passed && solved.arrival.is_ok() { ExitStatus::Done } else { ExitStatus::RunFailed })
 }
@@ -84,13 +73,6 @@ async fn said_while<T>(
     }
 }
 
-struct SolvedCase {
-    arrival: Result<Arrival, osteon_solver::Failure>,
-    first_signal: Option<FirstSignal>,
-    guided_waves: GuidedWaves,
-    check: Option<Check>,
-}
-
 fn solve(
     case: &Case,
     arguments: &SimulateArguments,
@@ -107,27 +89,17 @@ fn solve(
         }
         None => None,
     };
-    let mut workspace = Workspace::default();
-    let arrival = solver.arrival(&case.bone, &mut workspace);
-    let signal = |arrival| solver.first_signal(&case.bone, arrival, &mut workspace);
-    let first_signal = arrival.as_ref().ok().map(signal);
-    let guided_waves = solver.guided_waves(&case.bone);
+    let mut solved = SolvedCase::solve(case, &solver);
     if let Some((directory, traces)) = traces {
         // A check concerns only the solvers; the files kept are the same with and without it.
-        let shown = ShownSimulation {
-            setup: &case.setup,
-            arrival: &arrival,
-            first_signal: first_signal.as_ref(),
-            guided_waves: &guided_waves,
-            traces: None,
-            check: None,
-        };
+        let program = program::current();
+        let result = solved.report(program.clone()).to_json();
         let positions = case.setup.probe.receivers.positions();
         let print = |file: &mut dyn Write| csv(&traces, positions, file);
-        simulated.write(directory, &output::json::simulation(&shown), print)?;
+        simulated.write(directory, &program, &result, print)?;
     }
-    let check = arguments.check.then(|| Check::run(case, isa));
-    Ok(SolvedCase { arrival, first_signal, guided_waves, check })
+    solved.check = arguments.check.then(|| Check::run(case, isa));
+    Ok(solved)
 }
 
 fn trace_failure(error: TraceError) -> CommandFailure {

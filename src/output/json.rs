@@ -6,20 +6,14 @@ mod observations;
 use std::io::{self, Write};
 use std::path::Path;
 
-use osteon_common::version::Program;
-use osteon_files::report::{
-    CheckedSolution, FirstSignalReport, GuidedWaveReport, GuidedWavesReport, Receiver, Simulation,
-};
 use osteon_proto::timestamp;
 use osteon_proto::v1::{
     BackupEnd, BannedWorker, DepartedWorker, ExplainResponse, JobSnapshot, ListWorkersResponse,
     WorkerSnapshot,
 };
-use osteon_solver::check::{Difference, MethodSolution};
-use osteon_solver::{FirstSignal, GuidedWave, GuidedWaves};
 use serde_json::{Value, json};
 
-use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation, solver_of};
+use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation};
 use crate::doctor::{self, Diagnosis};
 use crate::output::text::operators::worker_state_name;
 use crate::output::text::{kind_name, state_name, status_name};
@@ -48,7 +42,7 @@ impl Output for JsonOutput<'_> {
     }
 
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
-        self.verbatim(&self::simulation(simulation))
+        self.verbatim(&simulation.solved.report(program::current()).to_json())
     }
 
     fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()> {
@@ -127,72 +121,6 @@ impl Output for JsonOutput<'_> {
     fn verbatim(&mut self, text: &str) -> io::Result<()> {
         self.writer.write_all(text.as_bytes())?;
         self.writer.flush()
-    }
-}
-
-/// Returns the JSON object of a simulation as text, with a final newline.
-pub(crate) fn simulation(simulation: &ShownSimulation<'_>) -> String {
-    let ShownSimulation { setup, arrival, first_signal, guided_waves, check, .. } = *simulation;
-    let Program { version, numerics, commit } = program::current();
-    let (found, failed) = (arrival.as_ref().ok(), arrival.as_ref().err());
-    let receivers = setup.probe.receivers.positions().enumerate().map(|(j, x1)| {
-        let time = found.and_then(|arrival| arrival.times.get(j).copied());
-        Receiver { x1, time }
-    });
-    let written = Simulation {
-        velocity: found.map(|arrival| arrival.velocity),
-        directions: found.and_then(|arrival| arrival.directions),
-        failure: failed.map(|failure| failure.kind),
-        detail: failed.map(|failure| failure.detail.clone()),
-        receivers: receivers.collect(),
-        first_signal: first_signal.map(first_signal_report),
-        guided_waves: guided_waves_report(guided_waves),
-        picking: setup.picking,
-        solver: solver_of(setup, found),
-        check: check.map(|check| check.solutions().map(checked).collect()),
-        version,
-        numerics,
-        commit,
-    };
-    written.to_json()
-}
-
-fn first_signal_report(signal: &FirstSignal) -> FirstSignalReport {
-    let FirstSignal { other_extremum, other_velocity, decay, center_frequency } = signal;
-    let failed = other_velocity.as_ref().err();
-    FirstSignalReport {
-        other_extremum: *other_extremum,
-        other_velocity: other_velocity.as_ref().ok().copied(),
-        other_failure: failed.map(|failure| failure.kind),
-        other_detail: failed.map(|failure| failure.detail.clone()),
-        decay: *decay,
-        center_frequency: *center_frequency,
-    }
-}
-
-fn guided_waves_report(waves: &GuidedWaves) -> GuidedWavesReport {
-    let wave = |wave: GuidedWave| GuidedWaveReport {
-        phase_velocity: wave.phase_velocity,
-        group_velocity: wave.group_velocity,
-    };
-    GuidedWavesReport {
-        frequency: waves.frequency,
-        a0: waves.a0.map(wave),
-        s0: waves.s0.map(wave),
-        reason: waves.reason().map(str::to_owned),
-    }
-}
-
-/// Converts one solution, with its outcome and its difference from the refined one.
-fn checked(solution: &MethodSolution) -> CheckedSolution {
-    let arrival = solution.arrival.as_ref();
-    CheckedSolution {
-        solver: solver_of(&solution.setup, arrival.ok()),
-        velocity: arrival.ok().map(|arrival| arrival.velocity),
-        failure: arrival.err().map(|failure| failure.kind),
-        same_pick: solution.difference != Difference::Picks,
-        time_difference: solution.difference.time(),
-        relative_difference: solution.difference.velocity(),
     }
 }
 

@@ -1,3 +1,4 @@
+use osteon_common::case::Setup;
 use osteon_common::job::{JobKind, Objective, Search, SearchMethod};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
@@ -5,8 +6,8 @@ use osteon_common::settings::Method;
 use osteon_files::document::Format as FileFormat;
 use osteon_files::job_file;
 use osteon_proto::v1::{JobKind as KindMessage, JobState, JobStatus};
-use osteon_solver::check::{Difference, MethodSolution};
-use osteon_solver::{Failure, FirstSignal, GuidedWave, PassSummary, Sampled};
+use osteon_solver::check::{Check, Difference, MethodSolution};
+use osteon_solver::{Arrival, Failure, FirstSignal, GuidedWave, GuidedWaves, PassSummary, Sampled};
 
 use super::*;
 use crate::sample_result::{identification, propagation};

@@ -3,6 +3,7 @@
 use std::ffi::OsString;
 
 use clap::Parser as _;
+use osteon_client::environment::Environment;
 
 use super::*;
 
@@ -12,18 +13,17 @@ fn run(line: &str, cores: u32, coordinator: Option<&str>) -> Run {
     let (Command::Identify(arguments) | Command::Propagate(arguments)) = command else {
         panic!("{line} is no run");
     };
-    let environment = environment(coordinator);
-    resolve_run(JobKind::Identification, arguments, cores, &environment).unwrap()
+    resolve_run(JobKind::Identification, arguments, &context(coordinator, cores)).unwrap()
 }
 
 /// An environment with this coordinator, and files for it.
-fn environment(coordinator: Option<&str>) -> Environment {
+fn context(coordinator: Option<&str>, cores: u32) -> ProcessContext {
     let files = ["OSTEON_TLS_CA", "OSTEON_TOKEN_FILE"];
-    Environment::read(|name| match name {
+    let environment = Environment::read(|name| match name {
         "OSTEON_COORDINATOR" => coordinator.map(OsString::from),
         name => files.contains(&name).then(|| OsString::from("file")),
-    })
-    .unwrap()
+    });
+    ProcessContext { environment: environment.unwrap(), cores }
 }
 
 fn here(line: &str, cores: u32) -> (u32, u32) {
@@ -64,8 +64,8 @@ fn an_environment_that_is_no_address_is_bad_input() {
     let Command::Identify(arguments) = Arguments::try_parse_from(words).unwrap().command else {
         panic!("no run");
     };
-    let failure = resolve_run(JobKind::Identification, arguments, 2, &environment(Some("nowhere")))
-        .unwrap_err();
+    let failure =
+        resolve_run(JobKind::Identification, arguments, &context(Some("nowhere"), 2)).unwrap_err();
     assert_eq!(failure.exit_code(), 2);
     assert!(failure.to_string().contains("OSTEON_COORDINATOR"), "{failure}");
     assert!(failure.to_string().contains("`nowhere`"), "{failure}");

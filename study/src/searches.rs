@@ -6,6 +6,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search, SearchMethod,
 };
+use osteon_common::moments::MOMENTS;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::realization::PointError;
@@ -181,7 +182,7 @@ fn nearest_match(
     };
     let unit = to_unit(at);
     let Some(found) = y(&unit)? else { return Ok(None) };
-    let mut rows = [vec![0.0; 7], vec![0.0; 7]];
+    let mut rows: newton::Rows = std::array::from_fn(|_| vec![0.0; 7]);
     for axis in 0..7 {
         let [mut below, mut above] = [unit, unit];
         below[axis] = (unit[axis] - DIFFERENCE).max(0.0);
@@ -192,10 +193,11 @@ fn nearest_match(
         }
     }
     let target = logarithms(data);
-    let right = [0, 1].map(|i| {
+    let mut right = [0.0; MOMENTS];
+    for i in 0..2 {
         let here: f64 = rows[i].iter().zip(unit).map(|(slope, u)| slope * u).sum();
-        here + target[i] - found[i]
-    });
+        right[i] = here + target[i] - found[i];
+    }
     Ok(Some(point_at(&newton::nearest(&to_unit(start), &rows, right))))
 }
 

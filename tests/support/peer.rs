@@ -102,11 +102,7 @@ pub(crate) fn solve(work: &Work) -> Vec<RealizationResult> {
             return RealizationResult::failed(FailureKind::NotFinite);
         };
         match solver.arrival(&bone, &mut workspace) {
-            Ok(arrival) => RealizationResult {
-                outcome: Ok(arrival.velocity),
-                estimated_error: arrival.estimated_error,
-                decay: 0.0,
-            },
+            Ok(arrival) => RealizationResult::solved(arrival.velocity, arrival.estimated_error),
             Err(failure) => RealizationResult::failed(failure.kind),
         }
     };

@@ -140,9 +140,8 @@ fn compute(
                 return Err(Interrupted::Stopped);
             }
             catch_unwind(AssertUnwindSafe(|| {
-                WORKSPACE.with_borrow_mut(|memory| match evaluation.with_decays {
-                    true => solver.realization_with_decay(&ensemble, index, memory),
-                    false => solver.realization(&ensemble, index, memory),
+                WORKSPACE.with_borrow_mut(|memory| {
+                    solver.realization_with(evaluation.observables, &ensemble, index, memory)
                 })
             }))
             .map_err(|payload| panicked(index, payload))

@@ -22,6 +22,7 @@ mod tables;
 mod terminal;
 mod tools;
 mod umbridge;
+mod wings;
 
 use std::env;
 use std::process::ExitCode;
@@ -168,6 +169,11 @@ const VERBS: &[Verb] = &[
 
 const SUITES: &[Subcommand] = &[
     (
+        "wings",
+        "* that the program is built without each of its wings, and without all of them",
+        Action::Function(wings::check),
+    ),
+    (
         "tracing",
         "* with the feature otel, and its lints",
         Action::Cargo(&[TEST_TRACING, LINT_TRACING]),
@@ -252,6 +258,7 @@ const CI: &[&[&str]] = &[
     &["lint"],
     &["lint", "deny"],
     &["test"],
+    &["test", "wings"],
     &["test", "tracing"],
     &["test", "metrics"],
     &["docs"],

@@ -1,4 +1,4 @@
-//! Tests of the commands for Slurm on a real Slurm, by `deploy/slurm/test/run.py`.
+//! Tests of the commands for Slurm on a real Slurm, by `slurm/test/run.py`.
 
 use std::env;
 use std::ffi::OsString;
@@ -31,7 +31,7 @@ pub(crate) fn test(words: &[String]) -> Result<()> {
     let python = env::var_os("PYTHON").unwrap_or_else(|| OsString::from("python3"));
     let mut command = Command::new(python);
     command.current_dir(root()).env("PYTHONDONTWRITEBYTECODE", "1");
-    command.arg("deploy/slurm/test/run.py").arg("--osteon").arg(programs()?.join("osteon"));
+    command.arg("slurm/test/run.py").arg("--osteon").arg(programs()?.join("osteon"));
     command.args(words.iter().filter(|word| *word != IF_INSTALLED));
     cargo(&mut command).context("the tests on Slurm did not pass (they need Python 3.10 or later)")
 }

@@ -13,7 +13,7 @@ use crate::statistics;
 use crate::violations::Violations;
 use crate::visible;
 
-use super::decays::all_decays;
+use super::observables::observables;
 use super::value::{known_wrong, number, quantity, whole};
 
 /// Accepted values of a measured velocity.
@@ -61,7 +61,7 @@ pub(super) fn data_from(data: &Data, origin: Option<&Origin>, violations: &mut V
         }
     }
     all_subjects(data, origin, violations);
-    all_decays(data, origin, violations);
+    observables(data, origin, violations);
     repeatability(data, violations);
 }
 

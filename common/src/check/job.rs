@@ -11,8 +11,8 @@ use crate::parameters::Parameter;
 use crate::violations::Violations;
 
 use super::data::{data_from, no_data};
-use super::decays::decays_of_job;
 use super::known_quantities::known_quantities;
+use super::observables::observables_of_job;
 use super::posterior::posterior_of_job;
 use super::priors::priors;
 use super::range::range;
@@ -64,7 +64,7 @@ pub fn job_from(
     evaluations(specification, violations);
     likelihood(specification, violations);
     chi_square(specification, violations);
-    decays_of_job(specification, origin, violations);
+    observables_of_job(specification, origin, violations);
     posterior_of_job(specification, violations);
     within_reach(specification, violations);
 }

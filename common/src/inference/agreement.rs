@@ -1,11 +1,11 @@
 //! Whether the model at a point matches the data, and whether a bound keeps it from matching better.
 
-use super::decay::DecayWeights;
 use super::noise::{Noise, noise, normal_law_noise};
 use crate::job::{Data, JobSpecification};
-use crate::moments::log_ratios;
+use crate::moments::{ComparedMoments, MOMENTS, MomentVector};
+use crate::observables::ObservableSet;
 use crate::parameters::{Parameter, Point};
-use crate::results::{DecayEstimate, Estimate};
+use crate::results::{Estimate, ObservableEstimates};
 
 /// Relative difference below which moments always count as matched: no measurement is more
 /// accurate.
@@ -18,14 +18,13 @@ const NEGLIGIBLE: f64 = 0.05;
 /// Comparison of a model's moments with those of the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Agreement {
-    /// Differences of the logarithms of mean and coefficient of variation, model minus data.
-    pub differences: [f64; 2],
+    /// Differences of the compared moments, model minus data.
+    pub differences: MomentVector,
     /// Standard errors of these, of data and sampling together, as they are counted; `None` if the
     /// data's are not known.
-    pub errors: Option<[f64; 2]>,
-    /// Difference of the mean decay relative to that of the data, model minus data, and its standard
-    /// error of data and sampling together; `None` if no decays were measured.
-    pub decay: Option<[f64; 2]>,
+    pub errors: Option<MomentVector>,
+    /// The observables that were measured.
+    pub observables: ObservableSet,
     /// Whether all differences are at most three standard errors of data and sampling, or
     /// negligible. Where a parameter lies on a bound, errors count at most as those of a normal law:
     /// an outlier must not excuse the difference that it causes.
@@ -35,82 +34,66 @@ pub struct Agreement {
     pub held: bool,
 }
 
-/// Compares a model's `estimate`, and that of its mean decay, at `point` with set number `set` of the
+/// Compares a model's `estimate`, and those of its observables, at `point` with set number `set` of the
 /// data; `None` without data.
 pub fn agreement(
     specification: &JobSpecification,
     set: usize,
     point: &Point,
     estimate: &Estimate,
-    decay: Option<&DecayEstimate>,
+    observables: &ObservableEstimates,
 ) -> Option<Agreement> {
     let data = specification.data.as_ref()?;
-    let noise = noise(data, set, estimate);
-    let differences = log_ratios(estimate.moments, data.moments(set));
-    let decay = decay.and_then(|decay| off_decay(data, set, decay));
-    Some(compared(specification, set, point, (differences, decay), &noise))
+    let noise = noise(data, set, estimate, observables);
+    let model = ComparedMoments::of_estimates(estimate, observables);
+    let differences = model.differences(&data.compared(set));
+    Some(compared(specification, set, point, differences, &noise))
 }
 
-/// Returns the relative difference of a model's mean decay from that of the data, and its standard error.
-pub(super) fn off_decay(data: &Data, set: usize, model: &DecayEstimate) -> Option<[f64; 2]> {
-    let weights = DecayWeights::of_data(data, set)?;
-    let difference = weights.difference_of_decays(model.mean);
-    let of_sampling = weights.relative(model.standard_error);
-    let variance = weights.covariance[2][2] + of_sampling * of_sampling;
-    Some([difference, variance.sqrt()])
-}
-
-/// Compares a model at `point`, given how far its moments are from those of the data, the same of its
-/// decay with its error, and the noise of the moments.
+/// Compares a model at `point`, given how far its moments are from those of the data, and their noise.
 pub(super) fn compared(
     specification: &JobSpecification,
     set: usize,
     point: &Point,
-    (differences, decay): ([f64; 2], Option<[f64; 2]>),
+    differences: MomentVector,
     noise: &Noise,
 ) -> Agreement {
     let variances = variances(noise);
     let limit = |axis: usize| (NEGLIGIBLE * NEGLIGIBLE * variances[axis]).max(EXACT * EXACT);
-    let negligible = |axis: usize| differences[axis] * differences[axis] <= limit(axis);
-    let is_met = negligible(0) && negligible(1) && is_near(decay, NEGLIGIBLE);
+    let is_met = (0..MOMENTS).all(|axis| differences[axis] * differences[axis] <= limit(axis));
     let held = is_on_bound(specification, point) && !is_met;
     let normal = specification.data.as_ref().filter(|_| held);
     let counted = normal.map_or(variances, |data| at_most_normal(data, set, noise));
     Agreement {
         differences,
         errors: noise.data.map(|_| counted.map(f64::sqrt)),
-        decay,
-        matched: is_within(differences, counted) && is_near(decay, ERRORS_MAX),
+        observables: specification.observables(),
+        matched: is_within(differences, counted),
         held,
     }
 }
 
-/// Returns whether the difference of decays is at most this many standard errors, or negligible.
-fn is_near(decay: Option<[f64; 2]>, errors: f64) -> bool {
-    decay.is_none_or(|[difference, error]| difference.abs() <= (errors * error).max(EXACT))
-}
-
 /// Returns whether the differences are within the noise.
-fn is_within(differences: [f64; 2], variances: [f64; 2]) -> bool {
-    let within = |axis: usize| {
-        let square = differences[axis] * differences[axis];
-        // The errors of a single realization are unknown (NaN), and `max` ignores them.
-        square <= (ERRORS_MAX * ERRORS_MAX * variances[axis]).max(EXACT * EXACT)
-    };
-    within(0) && within(1)
+fn is_within(differences: MomentVector, variances: MomentVector) -> bool {
+    // The errors of a single realization are unknown (NaN), and `max` ignores them.
+    let limit = |variance: f64| (ERRORS_MAX * ERRORS_MAX * variance).max(EXACT * EXACT);
+    differences.iter().zip(variances).all(|(one, variance)| one * one <= limit(variance))
 }
 
-fn variances(noise: &Noise) -> [f64; 2] {
+fn variances(noise: &Noise) -> MomentVector {
     let covariance = noise.covariance();
-    [covariance[0][0], covariance[1][1]]
+    std::array::from_fn(|axis| covariance[axis][axis])
 }
 
-/// Returns the variances with the data's part not larger than that of a normal law.
-fn at_most_normal(data: &Data, set: usize, found: &Noise) -> [f64; 2] {
-    let all = variances(found);
-    let Some(normal) = normal_law_noise(data, set) else { return all };
-    let normal = variances(&Noise { data: Some(normal), ..*found });
-    [all[0].min(normal[0]), all[1].min(normal[1])]
+/// Returns the variances with the data's part of the moments of the velocities not larger than that of a
+/// normal law.
+fn at_most_normal(data: &Data, set: usize, found: &Noise) -> MomentVector {
+    let mut all = variances(found);
+    if let Some(normal) = normal_law_noise(data, set) {
+        let [mean, variation, ..] = variances(&Noise { data: Some(normal), ..*found });
+        (all[0], all[1]) = (all[0].min(mean), all[1].min(variation));
+    }
+    all
 }
 
 fn is_on_bound(specification: &JobSpecification, point: &Point) -> bool {

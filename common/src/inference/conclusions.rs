@@ -30,10 +30,12 @@ impl Conclusions {
 }
 
 /// Returns the profiles, if the cost depends on the moments of the velocities alone; they do not apply
-/// to other costs: no closed form tells of the decay.
+/// to other costs: no closed form tells of other observables.
 fn of_moments(specification: &JobSpecification, set: usize, best: &BestPoint) -> Vec<Profile> {
     match (best.velocity, &specification.data) {
-        (Some(velocity), Some(data)) if is_of_moments(specification) => {
+        (Some(velocity), Some(data))
+            if is_of_moments(specification) && specification.observables().is_empty() =>
+        {
             let weights = weights(specification, set);
             let (model, measured) = (velocity.moments, data.moments(set));
             profiles(specification, &best.point, model, measured, weights.as_ref())
@@ -75,9 +77,9 @@ pub fn below_noise_from(
     best: &BestPoint,
     history: &[Evaluation],
 ) -> Option<u64> {
+    let data = specification.data.as_ref().filter(|_| is_of_moments(specification))?;
     let weights = weights(specification, set);
-    let of_moments = is_of_moments(specification);
-    of_moments.then(|| first_below_noise(set, best, weights.as_ref(), history)).flatten()
+    first_below_noise(set, best, &data.compared(set), weights.as_ref(), history)
 }
 
 /// Returns the weights of a set of data, if the cost is χ².
@@ -88,9 +90,7 @@ fn weights(specification: &JobSpecification, set: usize) -> Option<MomentWeights
 }
 
 fn is_of_moments(specification: &JobSpecification) -> bool {
-    specification.objective.is_of_moments()
-        && !specification.has_priors()
-        && !specification.has_decays()
+    specification.objective.is_of_moments() && !specification.has_priors()
 }
 
 /// Returns the cost that is low enough to stop; `None` for a likelihood.

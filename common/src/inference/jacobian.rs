@@ -1,22 +1,21 @@
-//! Derivatives of the logarithms of both moments, and of the mean decay, from differences on common germs.
+//! Derivatives of the compared moments, from differences on common germs.
 
-use super::decay::DecayWeights;
 use crate::conclusions::Sensitivity;
 use crate::job::{JobSpecification, Range};
-use crate::moments::log_ratios;
+use crate::moments::{MomentVector, log_ratios, moment_vector};
+use crate::observables::{ObservableSet, PerObservable};
 use crate::parameters::{Parameter, Point};
 use crate::results::{BestPoint, Evaluation};
 
-/// d(ln v, ln Δ, relative decay)/dx, a column for each free parameter, x in units of the box.
+/// Derivatives of the compared moments, a column for each free parameter x in units of the box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Jacobian {
     /// The free parameters.
     pub free: Vec<Parameter>,
-    /// Their columns: derivatives of ln v and ln Δ, and of the mean decay relative to that of the data;
-    /// 0 if no decays were measured.
-    pub columns: Vec<[f64; 3]>,
-    /// Whether decays were measured.
-    pub(super) has_decays: bool,
+    /// Their columns.
+    pub columns: Vec<MomentVector>,
+    /// The observables that were measured.
+    pub(super) observables: ObservableSet,
 }
 
 /// Returns the Jacobian at the best point of set number `set`; `None` if a derivative was not
@@ -28,12 +27,10 @@ pub fn jacobian(
     history: &[Evaluation],
 ) -> Option<Jacobian> {
     let base = best.velocity?.moments;
-    let has_decays = specification.has_decays();
-    let decay = match has_decays {
-        true => Some((DecayWeights::of_data(specification.data.as_ref()?, set)?, best.decay?.mean)),
-        false => None,
-    };
-    let mut jacobian = Jacobian { free: Vec::new(), columns: Vec::new(), has_decays };
+    let means = best.observables.map(|found| found.map(|found| found.mean));
+    let of_data = specification.data.as_ref()?.compared(set).observables;
+    let observables = of_data.set();
+    let mut jacobian = Jacobian { free: Vec::new(), columns: Vec::new(), observables };
     for parameter in Parameter::ALL {
         let range = specification.range(parameter);
         if matches!(range, Range::Fixed(_)) {
@@ -43,12 +40,14 @@ pub fn jacobian(
         let row = history.iter().find(varied)?;
         let at = |point: &Point| range.coordinate(point.get(parameter));
         let step = at(&row.point)? - at(&best.point)?;
-        let [mean, variation] = log_ratios(row.moments?, base);
-        let of_decay = match &decay {
-            Some((weights, base)) => weights.relative(row.decay? - base),
+        let changes = moment_vector(log_ratios(row.moments?, base), |one| match of_data[one] {
+            Some(measured) => {
+                let [found, base] = [row.observables[one], means[one]];
+                found.zip(base).map_or(f64::NAN, |(found, base)| (found - base) / measured)
+            }
             None => 0.0,
-        };
-        let column = [mean, variation, of_decay].map(|change| change / step);
+        });
+        let column = changes.map(|change| change / step);
         if !column.iter().all(|slope| slope.is_finite()) {
             return None;
         }
@@ -61,11 +60,13 @@ pub fn jacobian(
 impl Jacobian {
     /// Returns the derivatives for relative changes of the parameters.
     pub fn sensitivities(&self, at: &Point, specification: &JobSpecification) -> Vec<Sensitivity> {
-        let of = |(&parameter, column): (&Parameter, &[f64; 3])| {
+        let of = |(&parameter, column): (&Parameter, &MomentVector)| {
             let relative = at.get(parameter) / specification.range(parameter).edge();
-            let [mean, coefficient_of_variation, decay] = column.map(|slope| slope * relative);
-            let decay = self.has_decays.then_some(decay);
-            Sensitivity { parameter, mean, coefficient_of_variation, decay }
+            let [mean, coefficient_of_variation, others @ ..] =
+                column.map(|slope| slope * relative);
+            let observables =
+                PerObservable::new(|one| self.observables[one].then_some(others[one as usize]));
+            Sensitivity { parameter, mean, coefficient_of_variation, observables }
         };
         self.free.iter().zip(&self.columns).map(of).collect()
     }

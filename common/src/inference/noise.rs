@@ -1,8 +1,11 @@
-//! Errors of the logarithms of both moments, for the data and for the model.
+//! Errors of the compared moments, for the data and for the model.
 
 use crate::conclusions::NoiseErrors;
 use crate::job::{Data, Measurements};
-use crate::results::{Estimate, Moments};
+use crate::moments::{
+    ComparedMoments, Estimate, MOMENTS, MomentMatrix, MomentVector, Moments, ObservableEstimates,
+    moment_vector,
+};
 use crate::statistics;
 
 /// Quantile of the standard normal law at 0.975.
@@ -16,21 +19,21 @@ const FEW: [f64; 5] = [
     2.570_581_835_636_31,
 ];
 
-/// Covariances of (ln v, ln Δ).
+/// Covariances of the compared moments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Noise of the data's moments; `None` if only the moments are known, and not the number of
     /// velocities behind them.
     pub data: Option<DataNoise>,
     /// Variances of the model's moments by sampling.
-    pub model: [f64; 2],
+    pub model: MomentVector,
 }
 
 /// Noise of the data's moments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DataNoise {
-    /// Covariance of (ln v, ln Δ).
-    pub covariance: [[f64; 2]; 2],
+    /// Covariance of the compared moments.
+    pub covariance: MomentMatrix,
     /// Degrees of freedom: one less than there are independent velocities, or subjects.
     pub freedom: u64,
 }
@@ -39,9 +42,28 @@ pub struct DataNoise {
 /// interval is stated, and their own noise gives no weights.
 pub(crate) const PARTS_MIN: u64 = 5;
 
-/// Returns the noise of set number `set` of the data, and of a model's estimate.
-pub fn noise(data: &Data, set: usize, model: &Estimate) -> Noise {
-    Noise { data: data_noise(data, set), model: model.relative_errors().map(|error| error * error) }
+/// Returns the noise of set number `set` of the data, and of a model's estimates.
+pub fn noise(
+    data: &Data,
+    set: usize,
+    model: &Estimate,
+    observables: &ObservableEstimates,
+) -> Noise {
+    let errors = model_errors(&data.compared(set), model, observables);
+    Noise { data: data_noise(data, set), model: errors.map(|error| error * error) }
+}
+
+/// Returns the relative standard errors, by sampling, of a model's moments in which it is compared with
+/// these data.
+pub fn model_errors(
+    data: &ComparedMoments,
+    model: &Estimate,
+    observables: &ObservableEstimates,
+) -> MomentVector {
+    moment_vector(model.relative_errors(), |one| match (data.observables[one], observables[one]) {
+        (Some(mean), Some(found)) => found.standard_error / mean,
+        _ => 0.0,
+    })
 }
 
 /// Returns the noise of set number `set` of the data; `None` if it is not known.
@@ -51,11 +73,11 @@ pub fn data_noise(data: &Data, set: usize) -> Option<DataNoise> {
         return of_normal_law(measured, data.moments(set), count?);
     }
     let velocities = data.set(set)?;
-    let covariance = statistics::covariance_of_logarithms(&velocities)?;
+    let covariance = statistics::covariance_of_moments(&velocities)?;
     Some(DataNoise { covariance, freedom: velocities.parts() as u64 - 1 })
 }
 
-/// Returns the noise that the moments of set number `set` would have if its velocities were
+/// Returns the noise that the moments of the velocities of set number `set` would have if these were
 /// independent and had a normal law; `None` with subjects, or if their number is not known.
 pub(super) fn normal_law_noise(data: &Data, set: usize) -> Option<DataNoise> {
     if let Measurements::Moments { .. } = data.measurements {
@@ -78,35 +100,42 @@ fn of_normal_law(measured: Moments, matched: Moments, count: u64) -> Option<Data
     // Mean and variance of a normal sample are independent. By the ratio's square a relative change
     // of the variance is larger for the part that is matched.
     let of_deviation = (ratio * ratio) * (ratio * ratio) / (2.0 * (count - 1) as f64);
-    let covariance = [[of_mean, -of_mean], [-of_mean, of_deviation + of_mean]];
+    let covariance = of_velocities([[of_mean, -of_mean], [-of_mean, of_deviation + of_mean]]);
     covariance[1][1].is_finite().then_some(DataNoise { covariance, freedom: count - 1 })
 }
 
 impl Noise {
     /// Returns the covariance of both together.
-    pub fn covariance(&self) -> [[f64; 2]; 2] {
-        let mut sum = self.data.map_or([[0.0; 2]; 2], |data| data.covariance);
+    pub fn covariance(&self) -> MomentMatrix {
+        let mut sum = self.data.map_or([[0.0; MOMENTS]; MOMENTS], |data| data.covariance);
         for (axis, variance) in self.model.into_iter().enumerate() {
             sum[axis][axis] += variance;
         }
         sum
     }
 
-    /// Returns the standard errors.
+    /// Returns the standard errors of the moments of the velocities.
     pub fn errors(&self) -> NoiseErrors {
-        let errors = |variances: [f64; 2]| {
-            let [mean, coefficient_of_variation] = variances.map(f64::sqrt);
-            Moments { mean, coefficient_of_variation }
+        let errors = |[mean, variation]: [f64; 2]| Moments {
+            mean: mean.sqrt(),
+            coefficient_of_variation: variation.sqrt(),
         };
-        let variances =
-            |DataNoise { covariance: [[mean, _], [_, variation]], .. }| errors([mean, variation]);
-        NoiseErrors { data: self.data.map(variances), sampling: errors(self.model) }
+        let of_data = |data: DataNoise| errors([data.covariance[0][0], data.covariance[1][1]]);
+        let [mean, variation, ..] = self.model;
+        NoiseErrors { data: self.data.map(of_data), sampling: errors([mean, variation]) }
     }
 
     /// Returns how many standard errors an interval extends to each side.
     pub fn quantile(&self) -> f64 {
         self.data.map_or(NORMAL, |data| student_quantile(data.freedom))
     }
+}
+
+/// Returns the covariance of the compared moments with this of (ln v, ln Δ), and none of observables.
+pub(super) fn of_velocities(block: [[f64; 2]; 2]) -> MomentMatrix {
+    let mut covariance = [[0.0; MOMENTS]; MOMENTS];
+    covariance.iter_mut().zip(block).for_each(|(row, known)| row[..2].copy_from_slice(&known));
+    covariance
 }
 
 /// Returns the quantile of Student's law at 0.975 with `freedom` degrees of

@@ -1,16 +1,17 @@
 //! Quantities with their intervals, which stay within what the law of the elasticity allows.
 
-use super::decay::DecayWeights;
+use std::array;
+
 use super::linear::{Linear, NoiseResponse};
-use super::noise::{DataNoise, NORMAL, Noise};
+use super::noise::{NORMAL, Noise};
 use crate::bulk_velocity::bulk_velocity;
 use crate::conclusions::{DerivedQuantity, Uncertainty};
 use crate::data_statistics::{FewIntervals, intervals_of_data};
 use crate::ensemble::DISPERSION_MAX;
 use crate::job::{Data, JobSpecification, Range};
-use crate::moments::ConfidenceInterval;
-use crate::parameters::{Parameter, Point};
-use crate::results::{BestPoint, DecayEstimate};
+use crate::moments::{ConfidenceInterval, MOMENTS, MomentMatrix, MomentVector};
+use crate::parameters::{Parameter, Point, Scale};
+use crate::results::BestPoint;
 
 /// How far the logarithm of a mean velocity may be off the closed form, ln √(c1111/ρ), between two
 /// values of e_L.
@@ -42,54 +43,15 @@ impl LogarithmicEnds {
     }
 }
 
-/// Noise of (ln v, ln Δ, relative decay); that of the decay is 0 if no decays were measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct AllNoise {
-    /// Covariance of the data's; `None` if it is not known.
-    data: Option<[[f64; 3]; 3]>,
-    /// Variances of the model's by sampling.
-    model: [f64; 3],
-}
-
-impl AllNoise {
-    /// Returns that of two moments, and of the decay with these weights and the model's estimate.
-    pub(super) fn new(
-        two: &Noise,
-        weights: Option<&DecayWeights>,
-        decay: Option<&DecayEstimate>,
-    ) -> Self {
-        let of_two = |data: &DataNoise| {
-            let [[mean, both], [_, variation]] = data.covariance;
-            [[mean, both, 0.0], [both, variation, 0.0], [0.0; 3]]
-        };
-        let sampling = weights.zip(decay);
-        let sampling =
-            sampling.map_or(0.0, |(weights, decay)| weights.relative(decay.standard_error));
-        Self {
-            data: weights.map(|weights| weights.covariance).or(two.data.as_ref().map(of_two)),
-            model: [two.model[0], two.model[1], sampling * sampling],
-        }
-    }
-
-    /// Returns the covariance of both together.
-    fn covariance(&self) -> [[f64; 3]; 3] {
-        let mut sum = self.data.unwrap_or_default();
-        for (axis, variance) in self.model.into_iter().enumerate() {
-            sum[axis][axis] += variance;
-        }
-        sum
-    }
-}
-
 /// The quantities at a best point.
 pub(super) struct Quantities<'a> {
     pub(super) specification: &'a JobSpecification,
     pub(super) best: &'a BestPoint,
     pub(super) linear: &'a Linear,
-    pub(super) noise: &'a AllNoise,
+    pub(super) noise: &'a Noise,
     pub(super) quantile: f64,
-    /// Difference between data and model that the search has left.
-    pub(super) residual: [f64; 3],
+    /// Differences of the compared moments that the search has left, data minus model.
+    pub(super) residual: MomentVector,
     /// Ends of the intervals of the data's moments, if they are not symmetric.
     pub(super) ends: Option<LogarithmicEnds>,
     /// Whether intervals can be stated.
@@ -125,21 +87,11 @@ impl Quantities<'_> {
             let value = self.best.point.get(parameter);
             let quantity = match parameter {
                 Parameter::Dispersion => self.dispersion(free),
-                Parameter::LongitudinalPoissonRatio | Parameter::TransversePoissonRatio => {
-                    self.poisson_ratio(parameter, free)
-                }
+                _ if parameter.row().scale == Scale::Linear => self.poisson_ratio(parameter, free),
                 _ if self.may_have_second_value(parameter) => {
                     DerivedQuantity { value, known: None }
                 }
-                Parameter::Density
-                | Parameter::LongitudinalYoungModulus
-                | Parameter::LongitudinalShearModulus
-                | Parameter::TransverseYoungModulus
-                | Parameter::BoneThickness
-                | Parameter::BoneQualityFactor
-                | Parameter::CouplingSoundSpeed => {
-                    self.of_logarithm(value, &self.along(parameter, free, 1.0 / value))
-                }
+                _ => self.of_logarithm(value, &self.along(parameter, free, 1.0 / value)),
             };
             (parameter, quantity)
         };
@@ -214,11 +166,10 @@ impl Quantities<'_> {
     /// Returns how far an interval reaches below and above the value: the effect of the noise, plus
     /// the distance by which the solution would move if the residual were removed.
     fn reaches(&self, response: &NoiseResponse) -> [f64; 2] {
-        let [mean, variation, decay] = response.transfer;
-        let [of_mean, of_variation, of_decay] = self.residual;
-        let left = mean * of_mean + variation * of_variation + decay * of_decay;
+        let left = response.transfer.iter().zip(self.residual).map(|(by, left)| by * left);
+        let left: f64 = left.sum();
         let of_noise = match (&self.ends, &self.noise.data) {
-            (Some(ends), Some(data)) => self.combined(response.transfer, ends, data),
+            (Some(ends), Some(data)) => self.combined(response.transfer, ends, &data.covariance),
             _ => [self.quantile * response.deviation; 2],
         };
         of_noise.map(|reach| reach + left.abs())
@@ -229,20 +180,21 @@ impl Quantities<'_> {
     /// Psychol. Methods 12 (2007)), with the sampling's noise.
     fn combined(
         &self,
-        transfer: [f64; 3],
+        transfer: MomentVector,
         ends: &LogarithmicEnds,
-        covariance: &[[f64; 3]; 3],
+        covariance: &MomentMatrix,
     ) -> [f64; 2] {
         let correlation = |i: usize, j: usize| {
             let both = covariance[i][j] / (covariance[i][i] * covariance[j][j]).sqrt();
             if both.is_finite() { both } else { 0.0 }
         };
-        let of_decay = self.quantile * covariance[2][2].sqrt();
-        let ends = [ends.mean, ends.variation, [of_decay; 2]];
-        let model = self.noise.model;
-        let sampling = transfer[0] * transfer[0] * model[0]
-            + transfer[1] * transfer[1] * model[1]
-            + transfer[2] * transfer[2] * model[2];
+        let ends: [[f64; 2]; MOMENTS] = array::from_fn(|axis| match axis {
+            0 => ends.mean,
+            1 => ends.variation,
+            _ => [self.quantile * covariance[axis][axis].sqrt(); 2],
+        });
+        let by_sampling = transfer.iter().zip(self.noise.model);
+        let sampling: f64 = by_sampling.map(|(by, variance)| by * by * variance).sum();
         [0, 1].map(|side| {
             // An end of the quantity comes from the same end of a moment that raises it.
             let part = |axis: usize| match transfer[axis] {
@@ -250,14 +202,14 @@ impl Quantities<'_> {
                 transfer if transfer > 0.0 => transfer * ends[axis][side],
                 transfer => transfer * ends[axis][1 - side],
             };
-            let [one, other, decay] = [0, 1, 2].map(part);
-            if !(one.is_finite() && other.is_finite() && decay.is_finite()) {
+            let parts: MomentVector = array::from_fn(part);
+            if !parts.iter().all(|part| part.is_finite()) {
                 return f64::INFINITY;
             }
-            let of_velocities = one * one + other * other + 2.0 * correlation(0, 1) * one * other;
-            let across = correlation(0, 2) * one + correlation(1, 2) * other;
-            let data = of_velocities + decay * decay + 2.0 * decay * across;
-            (data.max(0.0) + NORMAL * NORMAL * sampling).sqrt()
+            let pairs = (0..MOMENTS).flat_map(|i| (0..i).map(move |j| (i, j)));
+            let both: f64 = pairs.map(|(i, j)| correlation(i, j) * parts[i] * parts[j]).sum();
+            let own: f64 = parts.iter().map(|part| part * part).sum();
+            ((own + 2.0 * both).max(0.0) + NORMAL * NORMAL * sampling).sqrt()
         })
     }
 

@@ -6,6 +6,7 @@ use crate::bulk_velocity::tests::{BOUNDS, OPTIMUM};
 use crate::case::Setup;
 use crate::ensemble::Germs;
 use crate::job::{Data, JobKind, Measurements, MonteCarlo, Objective, Range, Search};
+use crate::observables::PerObservable;
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
 use crate::random_quantities::RandomQuantities;
@@ -56,7 +57,7 @@ fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecifi
 
 fn row(point: Point, varied: Option<Parameter>) -> Evaluation {
     Evaluation {
-        decay: None,
+        observables: PerObservable::default(),
         number: 0,
         role: EvaluationRole { varied, ..EvaluationRole::default() },
         point,
@@ -70,7 +71,7 @@ fn row(point: Point, varied: Option<Parameter>) -> Evaluation {
 /// Returns the optimum as the best point.
 fn best(cost: f64, standard_error: Moments) -> BestPoint {
     BestPoint {
-        decay: None,
+        observables: PerObservable::default(),
         point: OPTIMUM,
         meaning: None,
         penalty: None,

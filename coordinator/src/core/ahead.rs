@@ -112,7 +112,7 @@ impl Ahead {
         let Some(complete) = evaluation.take_if(|evaluation| evaluation.is_settled()) else {
             return false;
         };
-        let Some((outcomes, estimated_error)) = complete.complete(branch.has_decays()) else {
+        let Some((outcomes, estimated_error)) = complete.complete(branch.observables()) else {
             return false;
         };
         let assessment = branch.tell(&outcomes, None);

@@ -189,11 +189,12 @@ impl Ballot {
     }
 }
 
-/// Returns whether two answers agree bit for bit, estimated errors and decays included.
+/// Returns whether two answers agree bit for bit, estimated errors and observables included.
 pub(crate) fn same(a: RealizationResult, b: RealizationResult) -> bool {
     let bits = |solved: RealizationResult| {
         let (code, velocity) = encode(solved.outcome);
-        (code, velocity.to_bits(), solved.estimated_error.to_bits(), solved.decay.to_bits())
+        let observables = solved.observables.map(f64::to_bits);
+        (code, velocity.to_bits(), solved.estimated_error.to_bits(), observables)
     };
     bits(a) == bits(b)
 }
@@ -207,11 +208,7 @@ mod tests {
     use super::*;
 
     fn vote(host: &str, process: u32, velocity: f64) -> Vote {
-        let result = |velocity| RealizationResult {
-            outcome: Ok(velocity),
-            estimated_error: 0.0,
-            decay: 0.0,
-        };
+        let result = |velocity| RealizationResult::solved(velocity, 0.0);
         Vote { by: WorkerName::new(host, process, 0), solved: vec![result(1.0), result(velocity)] }
     }
 

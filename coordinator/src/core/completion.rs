@@ -48,7 +48,7 @@ impl Completion {
     pub fn run(self, gathered: impl FnOnce(Gathered)) -> Option<Completed> {
         let Self { job, evaluation, search: mut after } = self;
         let (number, attempt, point) = (evaluation.number, evaluation.attempt, evaluation.point);
-        let outcomes = evaluation.outcomes(after.has_decays())?;
+        let outcomes = evaluation.outcomes(after.observables())?;
         let (estimated_error, assessment) = thread::scope(|scope| {
             // The record needs the estimated errors but not the moments, so it is sent to the store first.
             let assessed = scope.spawn(|| after.assess(&point, &outcomes));

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
+use osteon_common::observables::ObservableSet;
 use osteon_common::outcome::{Outcome, RealizationResult, encode};
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
@@ -312,24 +313,31 @@ impl PendingEvaluation {
             StoredRecord::Missing => true,
             StoredRecord::Damaged => false,
             StoredRecord::Outcomes(before) => {
-                let decays = |of: &Outcomes| -> Option<Vec<u64>> {
-                    of.decays().map(|all| all.iter().map(|decay| decay.to_bits()).collect())
+                let observables = |of: &Outcomes| {
+                    of.observables().map(|values| {
+                        let bits =
+                            |values: &[f64]| values.iter().map(|one| one.to_bits()).collect();
+                        values.map(bits).unwrap_or(Vec::new())
+                    })
                 };
                 !before.iter().map(bits).eq(outcomes.iter().map(bits))
-                    || decays(before) != decays(outcomes)
+                    || observables(before) != observables(outcomes)
             }
         }
     }
 
-    /// Returns all outcomes in index order, `with_decays` or without, and the estimated errors of the
+    /// Returns all outcomes in index order, with these observables, and the estimated errors of the
     /// successes, once it is settled.
-    pub fn complete(&self, with_decays: bool) -> Option<(Outcomes, Option<EstimatedError>)> {
-        Some((self.outcomes(with_decays)?, self.estimated_error()))
+    pub fn complete(
+        &self,
+        observables: ObservableSet,
+    ) -> Option<(Outcomes, Option<EstimatedError>)> {
+        Some((self.outcomes(observables)?, self.estimated_error()))
     }
 
-    /// Returns all outcomes in index order, `with_decays` or without, once it is settled.
-    pub(crate) fn outcomes(&self, with_decays: bool) -> Option<Outcomes> {
-        self.is_settled().then(|| self.results.outcomes(self.realizations, with_decays)).flatten()
+    /// Returns all outcomes in index order, with these observables, once it is settled.
+    pub(crate) fn outcomes(&self, observables: ObservableSet) -> Option<Outcomes> {
+        self.is_settled().then(|| self.results.outcomes(self.realizations, observables)).flatten()
     }
 
     /// Returns the estimated errors of the successes so far.

@@ -1,5 +1,6 @@
 //! Failures of a job that are not caused by its search.
 
+use osteon_common::observables::ObservedValues;
 use osteon_common::outcome::{RealizationResult, encode};
 use osteon_common::parameters::Point;
 use osteon_common::results::JobFailure;
@@ -74,6 +75,11 @@ fn hosts(hosts: &[String]) -> String {
     }
 }
 
+fn shown_observables(observables: &ObservedValues) -> String {
+    let present = observables.iter().filter(|(_, value)| **value != 0.0);
+    present.map(|(one, value)| format!(", {} {value:?}", one.name())).collect()
+}
+
 /// Describes an answer, for people.
 pub(crate) fn describe_answer(solved: RealizationResult) -> String {
     match solved.outcome {
@@ -81,10 +87,7 @@ pub(crate) fn describe_answer(solved: RealizationResult) -> String {
             "{velocity} m/s (bits {:016x}, estimated error {:?}{})",
             encode(solved.outcome).1.to_bits(),
             solved.estimated_error,
-            match solved.decay {
-                0.0 => String::new(),
-                decay => format!(", decay {decay:?}"),
-            }
+            shown_observables(&solved.observables)
         ),
         Err(kind) => kind.name().to_owned(),
     }

@@ -39,7 +39,7 @@ impl SetupKey {
             point: specification.start(),
             germs: specification.monte_carlo.germs(),
             random: specification.random,
-            with_decays: specification.has_decays(),
+            observables: specification.observables(),
         };
         let mut message = evaluation::to_message(&setup);
         (message.point, message.seed, message.sampling) = (None, 0, 0);

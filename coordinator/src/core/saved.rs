@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use osteon_common::observables::ObservableSet;
 use osteon_common::parameters::{PARAMETERS, Point};
 
 use crate::core::audit::{self, AuditKey};
@@ -95,7 +96,7 @@ pub(crate) fn take_unsaved(
 pub(crate) fn take_pieces(
     evaluation: &mut PendingEvaluation,
     job: JobId,
-    with_decays: bool,
+    observables: ObservableSet,
 ) -> Vec<PieceRecord> {
     if evaluation.stored != StoredRecord::Missing {
         return Vec::new();
@@ -104,7 +105,7 @@ pub(crate) fn take_pieces(
     let taken = sent.into_iter().filter_map(|piece| {
         let first = piece * PIECE_OUTCOMES;
         let outcomes =
-            evaluation.results.outcomes_in(first..first + PIECE_OUTCOMES, with_decays)?;
+            evaluation.results.outcomes_in(first..first + PIECE_OUTCOMES, observables)?;
         Some(PieceRecord { job, number: evaluation.number, first: first as u64, outcomes })
     });
     taken.collect()
@@ -157,7 +158,7 @@ mod tests {
     const PIECE: u64 = PIECE_OUTCOMES as u64;
 
     fn result(index: u64) -> RealizationResult {
-        RealizationResult { outcome: Ok(3000.0 + index as f64), estimated_error: 1e-5, decay: 0.0 }
+        RealizationResult::solved(3000.0 + index as f64, 1e-5)
     }
 
     fn fill(evaluation: &mut PendingEvaluation, first: u64, count: u64) {
@@ -167,7 +168,7 @@ mod tests {
 
     /// Returns the numbers of the pieces that are taken, and checks what is in them.
     fn take_numbers(evaluation: &mut PendingEvaluation) -> Vec<u64> {
-        let pieces = take_pieces(evaluation, JobId(5), false);
+        let pieces = take_pieces(evaluation, JobId(5), ObservableSet::NONE);
         for piece in &pieces {
             assert_eq!((piece.job, piece.number), (JobId(5), 3));
             let expected: Outcomes =

@@ -285,7 +285,7 @@ impl State {
             point,
             germs: specification.monte_carlo.germs(),
             random: specification.random,
-            with_decays: specification.has_decays(),
+            observables: specification.observables(),
         })
     }
 

@@ -9,6 +9,8 @@ use axum::http::header::AUTHORIZATION;
 use axum::http::{HeaderValue, StatusCode};
 use axum::middleware::Next;
 use axum::response::Response;
+use osteon_http::{OwnHosts, host_of, is_cross_site};
+use osteon_proto::identity::host_name;
 use thiserror::Error;
 use tokio::sync::watch;
 use tonic::Status;
@@ -18,7 +20,6 @@ use crate::access::{
 };
 use crate::live::assets;
 use crate::live::json;
-use crate::live::other_pages::{OwnHosts, host_of, is_cross_site};
 
 /// Path of the requirement to cancel jobs.
 const CANCEL: &str = "/data/jobs/0/cancel";
@@ -69,7 +70,7 @@ impl PageCaller {
 
 impl Gate {
     pub(crate) fn new(policy: watch::Receiver<Arc<Policy>>, hosts: Vec<String>) -> Self {
-        Self { policy, hosts: OwnHosts::with(hosts) }
+        Self { policy, hosts: OwnHosts::new(host_name(), hosts) }
     }
 
     fn decide(

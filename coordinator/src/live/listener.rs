@@ -3,30 +3,31 @@
 
 use std::io;
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::{Extension, Router};
-use hyper::server::conn::http1;
-use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::service::TowerToHyperService;
+use osteon_http::{ConnectionBounds, Connections};
 use osteon_proto::identity::host_name;
 use thiserror::Error;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
-use tokio::task::JoinSet;
 use tonic::transport::server::Connected as _;
 
 use crate::access::Policy;
 use crate::access::tls::Tls;
-use crate::live::stalled::ReadPeer;
+use crate::live::gate::Gate;
+use crate::live::routes;
+use crate::live::source::PageSource;
 use crate::service::accept::Acceptor;
+use crate::service::beside::{BesideKind, BesideListener, BesideTask, SharedParts};
+use crate::service::listen::Listener;
 
 /// Maximum number of connections at a time; others wait to be accepted.
 const CONNECTIONS_MAX: usize = 128;
-/// Time limit for the header of a request, which also ends idle connections.
-const HEADER_TIMEOUT: Duration = Duration::from_secs(30);
-/// Maximum size of the header of a request, bytes.
-const HEADER_BYTES_MAX: usize = 16 * 1024;
+/// A connection lasts as long as its browser asks and reads.
+const BOUNDS: ConnectionBounds =
+    ConnectionBounds { header: Duration::from_secs(30), whole: None, keep_alive: true };
 
 /// Error when the page cannot be served at an address.
 #[derive(Debug, Error)]
@@ -65,12 +66,12 @@ pub enum PageBindError {
 
 /// A bound address for the live page, to be served beside a coordinator's own.
 #[derive(Debug)]
-pub struct PageListener {
+struct PageListener {
     listener: TcpListener,
     address: SocketAddr,
     url: String,
     /// Further names under which browsers may ask for it.
-    pub(crate) hosts: Vec<String>,
+    hosts: Vec<String>,
 }
 
 impl PageListener {
@@ -79,7 +80,7 @@ impl PageListener {
     ///
     /// # Errors
     /// When the address is against these rules, or the operating system refuses it.
-    pub(crate) async fn bind(
+    async fn bind(
         address: SocketAddr,
         insecure: bool,
         hosts: Vec<String>,
@@ -108,14 +109,9 @@ impl PageListener {
         Ok(Self { listener, address, url: format!("{scheme}://{place}/"), hosts })
     }
 
-    /// Returns the URL of the page.
-    pub fn url(&self) -> &str {
-        &self.url
-    }
-
     /// Returns the command that makes a loopback address reachable from another machine; `None` for
     /// other addresses.
-    pub(crate) fn tunnel(&self) -> Option<String> {
+    fn tunnel(&self) -> Option<String> {
         let Self { address, .. } = self;
         let host = host_name().unwrap_or_else(|| "HOST".to_owned());
         let port = address.port();
@@ -123,30 +119,50 @@ impl PageListener {
     }
 }
 
+impl BesideListener for PageListener {
+    fn start(self: Box<Self>, parts: SharedParts<'_>) -> BesideTask {
+        let SharedParts { messages, store, write_times, policy, tls } = parts;
+        let url = self.url.clone();
+        match self.tunnel() {
+            Some(tunnel) => {
+                tracing::info!(%url, "live page; to see it from another machine: {tunnel}");
+            }
+            None => tracing::info!(%url, "live page"),
+        }
+        let source = PageSource::new(messages.clone(), store, write_times.clone());
+        let gate = Gate::new(policy.clone(), self.hosts.clone());
+        let router = routes::router(Arc::new(source), gate);
+        BesideTask::start(BesideKind::Page, url, serve(*self, tls.cloned(), router))
+    }
+}
+
+impl Listener {
+    /// Serves the live page on an address of its own, to the same callers and with the same certificates.
+    /// It answers for the names `hosts`, too.
+    ///
+    /// # Errors
+    /// When the address can be reached from other machines without TLS, and `insecure` is not given, or
+    /// the operating system refuses it.
+    pub async fn with_page(
+        self,
+        address: SocketAddr,
+        insecure: bool,
+        hosts: Vec<String>,
+    ) -> Result<Self, PageBindError> {
+        let (tls, policy) = (self.tls.as_ref(), &self.policy);
+        let page = PageListener::bind(address, insecure, hosts, tls, policy).await?;
+        Ok(self.with_beside(Box::new(page)))
+    }
+}
+
 /// Serves until the future is dropped, which closes every connection.
-pub(crate) async fn serve(
-    listener: PageListener,
-    tls: Option<watch::Receiver<Tls>>,
-    router: Router,
-) {
+async fn serve(listener: PageListener, tls: Option<watch::Receiver<Tls>>, router: Router) {
     let mut acceptor = Acceptor::for_pages(listener.listener, tls, CONNECTIONS_MAX);
-    let mut connections = JoinSet::new();
+    let mut connections = Connections::default();
     loop {
         let connection = acceptor.next().await;
         let router = router.clone().layer(Extension(connection.connect_info()));
-        let connection = http1::Builder::new()
-            .timer(TokioTimer::new())
-            .header_read_timeout(HEADER_TIMEOUT)
-            .max_buf_size(HEADER_BYTES_MAX)
-            .serve_connection(
-                TokioIo::new(ReadPeer::new(connection)),
-                TowerToHyperService::new(router),
-            );
-        connections.spawn(async move {
-            // Whether a browser was slow or has gone makes no difference here.
-            let _ = connection.await;
-        });
-        while connections.try_join_next().is_some() {}
+        connections.begin(BOUNDS.answer(connection, router));
     }
 }
 

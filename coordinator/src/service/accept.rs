@@ -121,6 +121,10 @@ impl Acceptor {
     }
 
     /// Returns an acceptor of at most `most` connections of browsers at a time.
+    #[cfg_attr(
+        not(feature = "live"),
+        expect(dead_code, reason = "only the live page is for browsers")
+    )]
     pub(crate) fn for_pages(
         listener: TcpListener,
         tls: Option<watch::Receiver<Tls>>,

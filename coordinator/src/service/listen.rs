@@ -19,8 +19,8 @@ use tokio::net::{TcpListener, UnixListener, UnixStream};
 use crate::access::Policy;
 use crate::access::tls::Tls;
 use crate::access::tokens::Tokens;
-use crate::live::listener::{PageBindError, PageListener};
 use crate::service::accept::BoundSocket;
+use crate::service::beside::BesideListener;
 use crate::service::metrics_listener::MetricsListener;
 
 /// An address to listen on: `127.0.0.1:7000`, `[::1]:0`, `localhost:0` or `unix:PATH`. With port 0
@@ -98,10 +98,8 @@ pub struct Listener {
     pub(crate) file: Option<SocketFile>,
     pub(crate) tls: Option<Tls>,
     pub(crate) policy: Policy,
-    /// Present if metrics are exported.
-    pub(crate) metrics: Option<MetricsListener>,
-    /// Present if the live page is served.
-    pub(crate) page: Option<PageListener>,
+    /// What is served beside the API.
+    pub(crate) beside: Vec<Box<dyn BesideListener>>,
     /// Present if spans are recorded.
     pub(crate) spans: Option<Arc<dyn SpanRecorder>>,
     url: String,
@@ -164,24 +162,14 @@ impl Listener {
     /// Exports metrics on an address of their own.
     #[must_use]
     pub fn with_metrics(self, metrics: MetricsListener) -> Self {
-        Self { metrics: Some(metrics), ..self }
+        self.with_beside(Box::new(metrics))
     }
 
-    /// Serves the live page on an address of its own, to the same callers and with the same certificates.
-    /// It answers for the names `hosts`, too.
-    ///
-    /// # Errors
-    /// When the address can be reached from other machines without TLS, and `insecure` is not given, or
-    /// the operating system refuses it.
-    pub async fn with_page(
-        self,
-        address: SocketAddr,
-        insecure: bool,
-        hosts: Vec<String>,
-    ) -> Result<Self, PageBindError> {
-        let (tls, policy) = (self.tls.as_ref(), &self.policy);
-        let page = PageListener::bind(address, insecure, hosts, tls, policy).await?;
-        Ok(Self { page: Some(page), ..self })
+    /// Serves something beside the API.
+    #[must_use]
+    pub(crate) fn with_beside(mut self, listener: Box<dyn BesideListener>) -> Self {
+        self.beside.push(listener);
+        self
     }
 
     /// Records the spans of jobs, if there is a recorder.
@@ -228,8 +216,7 @@ impl Listener {
             file,
             tls: None,
             policy: Policy::Everybody,
-            metrics: None,
-            page: None,
+            beside: Vec::new(),
             spans: None,
             url,
         }

@@ -1,29 +1,28 @@
 //! The listener of the metrics: answers `GET /metrics` over HTTP/1.1, within bounds on connections,
 //! requests and time.
 
-use std::convert::Infallible;
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use http_body_util::Full;
-use hyper::body::{Bytes, Incoming};
-use hyper::header::{ALLOW, CONTENT_TYPE};
-use hyper::server::conn::http1;
-use hyper::service::service_fn;
-use hyper::{Method, Request, Response, StatusCode};
-use hyper_util::rt::{TokioIo, TokioTimer};
+use axum::Router;
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::header::{ALLOW, CONTENT_TYPE, HeaderValue};
+use axum::http::{Method, StatusCode, Uri};
+use axum::response::Response;
+use osteon_http::{ConnectionBounds, Connections};
 use thiserror::Error;
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, mpsc, oneshot};
-use tokio::task::JoinSet;
-use tokio::time::{sleep, timeout};
+use tokio::time::timeout;
 
 use crate::metrics::exposition;
 use crate::metrics::families::{Scrape, families};
 use crate::metrics::process::{ProcessUsage, unix_time_s};
 use crate::metrics::write_times::WriteTimes;
+use crate::service::beside::{BesideKind, BesideListener, BesideTask, SharedParts};
 use crate::service::core_task::Message;
 use crate::service::meter::CoreReport;
 
@@ -31,16 +30,14 @@ use crate::service::meter::CoreReport;
 pub const METRICS_PATH: &str = "/metrics";
 /// Maximum number of connections at a time; others wait to be accepted.
 const CONNECTIONS_MAX: usize = 16;
-/// Time limit for a whole connection: one request and its answer.
-const CONNECTION_TIMEOUT: Duration = Duration::from_secs(10);
-/// Time limit for the header of a request.
-const HEADER_TIMEOUT: Duration = Duration::from_secs(5);
+/// A connection has one request and its answer.
+const BOUNDS: ConnectionBounds = ConnectionBounds {
+    header: Duration::from_secs(5),
+    whole: Some(Duration::from_secs(10)),
+    keep_alive: false,
+};
 /// Time limit for the answer of the core task.
 const CORE_TIMEOUT: Duration = Duration::from_secs(5);
-/// Maximum size of the header of a request, bytes.
-const HEADER_BYTES_MAX: usize = 16 * 1024;
-/// Pause after the operating system failed to accept a connection.
-const REFUSED_WAIT: Duration = Duration::from_millis(100);
 
 /// Error when the address of the metrics cannot be bound.
 #[derive(Debug, Error)]
@@ -79,15 +76,24 @@ impl MetricsListener {
     }
 }
 
+impl BesideListener for MetricsListener {
+    fn start(self: Box<Self>, parts: SharedParts<'_>) -> BesideTask {
+        let sources = MetricSources::new(parts.messages.clone(), parts.write_times.clone());
+        let url = self.url.clone();
+        tracing::info!(%url, "metrics are exported");
+        BesideTask::start(BesideKind::Metrics, url, serve(*self, sources))
+    }
+}
+
 /// Where the numbers come from.
-pub(crate) struct MetricSources {
+struct MetricSources {
     messages: mpsc::Sender<Message>,
     write_times: WriteTimes,
     started_s: f64,
 }
 
 impl MetricSources {
-    pub(crate) fn new(messages: mpsc::Sender<Message>, write_times: WriteTimes) -> Self {
+    fn new(messages: mpsc::Sender<Message>, write_times: WriteTimes) -> Self {
         Self { messages, write_times, started_s: unix_time_s() }
     }
 
@@ -116,51 +122,25 @@ impl MetricSources {
 }
 
 /// Serves until the future is dropped, which closes every connection.
-pub(crate) async fn serve(listener: MetricsListener, sources: MetricSources) {
-    let (sources, places) = (Arc::new(sources), Arc::new(Semaphore::new(CONNECTIONS_MAX)));
-    let mut connections = JoinSet::new();
-    loop {
-        let Ok(place) = Arc::clone(&places).acquire_owned().await else {
-            return;
-        };
-        match listener.listener.accept().await {
-            Ok((stream, _)) => {
-                let sources = Arc::clone(&sources);
-                connections.spawn(async move {
-                    connection(stream, sources).await;
-                    drop(place);
-                });
-            }
-            // Too many files are open, say.
-            Err(_) => sleep(REFUSED_WAIT).await,
-        }
-        while connections.try_join_next().is_some() {}
+async fn serve(listener: MetricsListener, sources: MetricSources) {
+    let router = Router::new().fallback(answer).with_state(Arc::new(sources));
+    let places = Arc::new(Semaphore::new(CONNECTIONS_MAX));
+    let mut connections = Connections::default();
+    while let Ok(place) = Arc::clone(&places).acquire_owned().await {
+        let stream = osteon_http::accept(&listener.listener).await;
+        let answered = BOUNDS.answer(stream, router.clone());
+        connections.begin(async move {
+            answered.await;
+            drop(place);
+        });
     }
 }
 
-async fn connection(stream: TcpStream, sources: Arc<MetricSources>) {
-    let service = service_fn(move |request: Request<Incoming>| {
-        let sources = Arc::clone(&sources);
-        async move { Ok::<_, Infallible>(answer(&request, &sources).await) }
-    });
-    let connection = http1::Builder::new()
-        .timer(TokioTimer::new())
-        .header_read_timeout(HEADER_TIMEOUT)
-        .max_buf_size(HEADER_BYTES_MAX)
-        .keep_alive(false)
-        .serve_connection(TokioIo::new(stream), service);
-    // Whether the client was slow or has gone makes no difference here.
-    let _ = timeout(CONNECTION_TIMEOUT, connection).await;
-}
-
-async fn answer(request: &Request<Incoming>, sources: &MetricSources) -> Response<Full<Bytes>> {
-    let get = [Method::GET, Method::HEAD].contains(request.method());
-    match request.uri().path() {
-        METRICS_PATH if !get => {
+async fn answer(State(sources): State<Arc<MetricSources>>, method: Method, uri: Uri) -> Response {
+    match uri.path() {
+        METRICS_PATH if ![Method::GET, Method::HEAD].contains(&method) => {
             let mut refused = plain_response(StatusCode::METHOD_NOT_ALLOWED, "only GET and HEAD\n");
-            refused
-                .headers_mut()
-                .insert(ALLOW, hyper::header::HeaderValue::from_static("GET, HEAD"));
+            refused.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
             refused
         }
         METRICS_PATH => match sources.text().await {
@@ -174,18 +154,18 @@ async fn answer(request: &Request<Incoming>, sources: &MetricSources) -> Respons
     }
 }
 
-fn plain_response(status: StatusCode, text: &'static str) -> Response<Full<Bytes>> {
+fn plain_response(status: StatusCode, text: &'static str) -> Response {
     typed_response(status, "text/plain; charset=utf-8", text)
 }
 
 fn typed_response(
     status: StatusCode,
     content_type: &'static str,
-    text: impl Into<Bytes>,
-) -> Response<Full<Bytes>> {
-    let mut response = Response::new(Full::new(text.into()));
+    text: impl Into<Body>,
+) -> Response {
+    let mut response = Response::new(text.into());
     *response.status_mut() = status;
-    let content_type = hyper::header::HeaderValue::from_static(content_type);
+    let content_type = HeaderValue::from_static(content_type);
     response.headers_mut().insert(CONTENT_TYPE, content_type);
     response
 }

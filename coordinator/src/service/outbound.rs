@@ -86,10 +86,10 @@ impl EvaluationMessages {
     /// Returns the message that announces an evaluation.
     fn announcement(&mut self, input: &EvaluationInput) -> AttachResponse {
         if let Some(made) = self.0.get(input.id) {
-            return *made;
+            return made.clone();
         }
         let made = evaluation(input);
-        self.0.announce(input.id, made);
+        self.0.announce(input.id, made.clone());
         made
     }
 }
@@ -184,7 +184,7 @@ mod tests {
             point: Point::of_bone([1.0; 7]),
             germs,
             random: RandomQuantities::default(),
-            with_decays: false,
+            observables: osteon_common::observables::ObservableSet::NONE,
         };
         Work { evaluation: Arc::new(evaluation), first: 0, count: 1 }
     }

@@ -25,20 +25,15 @@ use crate::config::Config;
 use crate::core::audit::AuditKey;
 use crate::core::reactor::Restored;
 use crate::core::state::State;
-use crate::live;
-use crate::live::gate::Gate;
-use crate::live::listener::PageListener;
-use crate::live::routes;
-use crate::live::source::PageSource;
 use crate::metrics::write_times::WriteTimes;
 use crate::service::accept::{self, Places};
+use crate::service::beside::{BesideKind, BesideTask, SharedParts};
 use crate::service::core_task::{Clock, Core, Message, Monitoring};
 use crate::service::failing::{ComponentFailure, FailureReporter, Guard};
 use crate::service::job_spans::JobSpans;
 use crate::service::jobs::JobsService;
 use crate::service::listen::Listener;
 use crate::service::meter::Meter;
-use crate::service::metrics_listener::{self, MetricSources, MetricsListener};
 use crate::service::workers::WorkersService;
 use crate::store::thread::{self, StoreCommand};
 use crate::store::{Store, StoreError};
@@ -95,64 +90,9 @@ pub struct Coordinator {
     server: tokio::task::JoinHandle<()>,
     core: tokio::task::JoinHandle<()>,
     store: JoinHandle<()>,
-    metrics: Option<MetricsTask>,
-    page: Option<PageTask>,
+    beside: Vec<BesideTask>,
     shutdown_timeout: Duration,
     drained: bool,
-}
-
-/// The task that serves metrics; it ends when this is dropped.
-#[derive(Debug)]
-struct MetricsTask {
-    url: String,
-    task: tokio::task::JoinHandle<()>,
-}
-
-impl MetricsTask {
-    fn start(listener: MetricsListener, sources: MetricSources) -> Self {
-        let url = listener.url().to_owned();
-        tracing::info!(%url, "metrics are exported");
-        Self { url, task: tokio::spawn(metrics_listener::serve(listener, sources)) }
-    }
-}
-
-impl Drop for MetricsTask {
-    fn drop(&mut self) {
-        self.task.abort();
-    }
-}
-
-/// The task that serves the live page; it ends when this is dropped.
-#[derive(Debug)]
-struct PageTask {
-    url: String,
-    task: tokio::task::JoinHandle<()>,
-}
-
-impl PageTask {
-    fn start(
-        listener: PageListener,
-        source: PageSource,
-        policy: watch::Receiver<Arc<Policy>>,
-        tls: Option<watch::Receiver<Tls>>,
-    ) -> Self {
-        let url = listener.url().to_owned();
-        match listener.tunnel() {
-            Some(tunnel) => {
-                tracing::info!(%url, "live page; to see it from another machine: {tunnel}");
-            }
-            None => tracing::info!(%url, "live page"),
-        }
-        let gate = Gate::new(policy, listener.hosts.clone());
-        let router = routes::router(Arc::new(source), gate);
-        Self { url, task: tokio::spawn(live::listener::serve(listener, tls, router)) }
-    }
-}
-
-impl Drop for PageTask {
-    fn drop(&mut self) {
-        self.task.abort();
-    }
 }
 
 /// Starts a coordinator on a bound address, and continues the jobs of its store.
@@ -189,16 +129,18 @@ pub async fn start(
         failing.guard(ComponentFailure::Store),
     )
     .map_err(|source| StartError::Thread { source })?;
-    let metrics = listener.metrics.take().map(|listener| {
-        MetricsTask::start(listener, MetricSources::new(messages.clone(), write_times.clone()))
-    });
     let listener_spans = listener.spans.take();
     let (policy, decided) = watch::channel(Arc::new(listener.policy.clone()));
     let (tls, shown) = listener.tls.clone().map(watch::channel).unzip();
-    let page = listener.page.take().map(|listener| {
-        let source = PageSource::new(messages.clone(), &commands, write_times);
-        PageTask::start(listener, source, decided.clone(), shown.clone())
-    });
+    let parts = SharedParts {
+        messages: &messages,
+        store: &commands,
+        write_times: &write_times,
+        policy: &decided,
+        tls: shown.as_ref(),
+    };
+    let beside = std::mem::take(&mut listener.beside).into_iter();
+    let beside: Vec<BesideTask> = beside.map(|listener| listener.start(parts)).collect();
     let router = services(&messages, &commands, decided, config).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
@@ -206,7 +148,7 @@ pub async fn start(
     let server = serve(router, listener, shown, places.clone(), stopped);
     let server = tokio::spawn(run_guarded(failing.guard(ComponentFailure::Server), server));
     let guard = failing.guard(ComponentFailure::Core);
-    let meter = (metrics.is_some() || page.is_some()).then(Meter::default);
+    let meter = (!beside.is_empty()).then(Meter::default);
     let monitoring = Monitoring { meter, spans: listener_spans.map(JobSpans::new) };
     let core = Core::new(state, clock, commands, events, places, failing.clone(), monitoring);
     let core = core.run(effects, inbox, from_store, config.tick);
@@ -222,8 +164,7 @@ pub async fn start(
         server,
         core,
         store,
-        metrics,
-        page,
+        beside,
         shutdown_timeout: config.shutdown_timeout,
         drained: false,
     })
@@ -238,12 +179,16 @@ impl Coordinator {
 
     /// Returns the URL of the metrics, if they are exported.
     pub fn metrics_url(&self) -> Option<&str> {
-        self.metrics.as_ref().map(|metrics| metrics.url.as_str())
+        self.url_beside(BesideKind::Metrics)
     }
 
     /// Returns the URL of the live page, if it is served.
     pub fn page_url(&self) -> Option<&str> {
-        self.page.as_ref().map(|page| page.url.as_str())
+        self.url_beside(BesideKind::Page)
+    }
+
+    fn url_beside(&self, kind: BesideKind) -> Option<&str> {
+        self.beside.iter().find(|task| task.kind == kind).map(|task| task.url.as_str())
     }
 
     /// Replaces the accepted tokens, for every call that begins from now on. A coordinator that
@@ -297,8 +242,7 @@ impl Coordinator {
         self.drain().await;
         self.core.abort();
         let _ = self.core.await;
-        drop(self.metrics);
-        drop(self.page);
+        drop(self.beside);
         let _ = self.stop_serving.send(());
         let mut server = self.server;
         if tokio::time::timeout(self.shutdown_timeout, &mut server).await.is_err() {

@@ -143,11 +143,7 @@ fn realization(work: &Work, index: u64) -> RealizationResult {
     let margin = e_l * (1.0 - nu_t) - 2.0 * e_t * nu_l * nu_l;
     let c11 = e_l * e_l * (1.0 - nu_t) / margin;
     let velocity = 0.99 * (c11 / density).sqrt() * (1.0 + 0.92 * dispersion * uniform);
-    RealizationResult {
-        outcome: Ok(velocity),
-        estimated_error: 1e-5 * (noise % 1000) as f64 / velocity,
-        decay: 0.0,
-    }
+    RealizationResult::solved(velocity, 1e-5 * (noise % 1000) as f64 / velocity)
 }
 
 /// Returns a well mixed function of one number (splitmix64).
@@ -203,7 +199,7 @@ pub(crate) fn evaluation(
         setup: specification.setup,
         point,
         random: RandomQuantities::default(),
-        with_decays: false,
+        observables: osteon_common::observables::ObservableSet::NONE,
         germs: specification.monte_carlo.germs(),
     });
     let work = |first| Work { evaluation: Arc::clone(&evaluation), first, count: 1 };

@@ -8,18 +8,19 @@ use osteon_common::field_path::entry_path;
 use osteon_common::fields::{Key, WholeRange};
 use osteon_common::job::{Data, Group, JobKind, Measurements};
 use osteon_common::known_quantities::KnownQuantities;
+use osteon_common::observables::{Observable, PerObservable};
 use osteon_common::origin::Origin;
 use osteon_common::parameters::Parameter;
 
-use super::csv_format;
+use super::{csv_format, observables};
 use crate::document::{Node, Value};
 use crate::reader::{Reader, Table};
 use crate::velocities::{self, CsvError, CsvFormat, Measured, NamedColumns};
 
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 
-/// The keys of `[data]`.
-pub(super) const KEYS: [Key; 20] = [
+/// The keys of `[data]` for a file.
+const KEYS_OF_A_FILE: [Key; 11] = [
     Key {
         name: "velocities",
         meaning: "for `identify`: path of a CSV file, relative to the job file's directory, with a \
@@ -79,14 +80,9 @@ pub(super) const KEYS: [Key; 20] = [
                   velocities of one subject are not independent, see [below](#noise-of-the-data); at \
                   least two subjects, in each group",
     },
-    Key {
-        name: "decay",
-        meaning: "name of the CSV column that holds the decay along the array (dB/cm, -100 to 100, with a \
-                  mean above 0) measured with each velocity, in every row: the mean decay is matched \
-                  beside the moments of the velocities, see [below](#decays); requires the objective \
-                  `\"chi_square\"`, the search `\"simplex\"`, no `[posterior]`, and at least ten \
-                  velocities, or subjects, in each group",
-    },
+];
+/// Those for groups.
+const KEYS_OF_GROUPS: [Key; 3] = [
     Key {
         name: "known",
         meaning: "quantities of the setup that are known of each group: the names of the CSV columns that \
@@ -103,10 +99,9 @@ pub(super) const KEYS: [Key; 20] = [
         name: "subjects",
         meaning: "with a list of velocities: the subject of each, a whole number",
     },
-    Key {
-        name: "decays",
-        meaning: "with a list of velocities: the decay of each, dB/cm, as for `decay`",
-    },
+];
+/// Those for moments, and for noise.
+const KEYS_OF_MOMENTS: [Key; 4] = [
     Key {
         name: MOMENTS[0],
         meaning: "mean of the velocities, m/s, above 0; replaces `data.velocities` and requires \
@@ -128,6 +123,13 @@ pub(super) const KEYS: [Key; 20] = [
                   of the data's variance and not of the model's",
     },
 ];
+/// Returns the keys of `[data]`.
+pub(super) fn keys() -> Vec<Key> {
+    let (columns, lists) = (observables::column_keys(), observables::list_keys());
+    let parts: [&[Key]; 5] = [&KEYS_OF_A_FILE, &columns, &KEYS_OF_GROUPS, &lists, &KEYS_OF_MOMENTS];
+    parts.concat()
+}
+
 /// Largest number that names a subject.
 const SUBJECT: WholeRange = WholeRange { min: 0, max: u32::MAX as u64 };
 
@@ -157,7 +159,7 @@ fn given(
     kind: JobKind,
     from_file: impl FnOnce(&str, &NamedColumns<'_>, &CsvFormat) -> Result<Measurements, Vec<CsvError>>,
 ) -> Option<Data> {
-    let table = reader.table(root, "data", &KEYS.map(|key| key.name));
+    let table = reader.table(root, "data", &keys().iter().map(|key| key.name).collect::<Vec<_>>());
     if !table.is_table() {
         if kind == JobKind::Identification && !root.has("data") {
             reader.lacks("data", &["data".to_owned()], check::no_data());
@@ -212,9 +214,8 @@ fn unneeded(reader: &mut Reader, table: &Table<'_>, has_moments: bool) {
         let message = "has a subject for each of `velocities`, and there are none";
         reader.lacks(&table.path("subjects"), &[table.path("velocities")], message);
     }
-    if table.has("decays") && !has_velocities {
-        let message = "has a decay for each of `velocities`, and there are none";
-        reader.lacks(&table.path("decays"), &[table.path("velocities")], message);
+    if !has_velocities {
+        observables::unneeded(reader, table);
     }
     if table.has("count") && !has_moments {
         let message = "is the number of velocities behind `mean` and `coefficient_of_variation`, and \
@@ -251,7 +252,8 @@ fn group(reader: &mut Reader, groups: &str, name: &str, node: &Node) -> Option<G
     match &node.value {
         Value::List(elements) => Some(Group::new(name, reader.numbers(&path, elements)?)),
         Value::Table(_) => {
-            let mut keys = vec!["velocities", "subjects", "decays"];
+            let mut keys = vec!["velocities", "subjects"];
+            keys.extend(Observable::ALL.map(|one| one.row().plural));
             keys.extend(Parameter::OF_SETUP.map(Parameter::name));
             let table = reader.table_at(node, path, &keys);
             let expected = "a list of velocities (m/s)";
@@ -260,16 +262,15 @@ fn group(reader: &mut Reader, groups: &str, name: &str, node: &Node) -> Option<G
             }
             let elements = reader.list(&table, "velocities", expected);
             let subjects = subjects(reader, &table);
-            let decays = decays(reader, &table);
+            let observables = observables::lists(reader, &table);
             let known = Parameter::OF_SETUP.map(|one| reader.number(&table, one.name()));
             let known = KnownQuantities::new(known);
             let velocities = reader.numbers(&table.path("velocities"), elements?)?;
-            let (name, subjects, decays) = (name.to_owned(), subjects?, decays?);
-            Some(Group { name, velocities, subjects, decays, known })
+            let (name, subjects, observables) = (name.to_owned(), subjects?, observables?);
+            Some(Group { name, velocities, subjects, observables, known })
         }
         other => {
-            let expected =
-                "a list of velocities (m/s), or a table with velocities, subjects and decays";
+            let expected = "a list of velocities (m/s), or a table with velocities, subjects and other observables";
             reader.wrong_type(path, expected, other);
             None
         }
@@ -287,17 +288,8 @@ fn subjects(reader: &mut Reader, table: &Table<'_>) -> Option<Option<Vec<u32>>> 
     Some(Some(numbered(whole)))
 }
 
-/// Reads the list `decays`, if there is one; `None` if it is wrong.
-fn decays(reader: &mut Reader, table: &Table<'_>) -> Option<Option<Vec<f64>>> {
-    if !table.has("decays") {
-        return Some(None);
-    }
-    let elements = reader.list(table, "decays", "a list with a decay (dB/cm) for each velocity")?;
-    Some(Some(reader.numbers(&table.path("decays"), elements)?))
-}
-
 /// Keys that belong to a file of velocities, and what is wrong with each beside a list.
-const OF_A_FILE: [(&str, &str); 4] = [
+const OF_A_FILE: [(&str, &str); 3] = [
     (
         "group",
         "names a column of a file, but velocities is a list; give the name of a CSV file, or [data.groups]",
@@ -312,27 +304,16 @@ const OF_A_FILE: [(&str, &str); 4] = [
         "names a column of a file, but velocities is a list; give the name of a CSV file, or the list \
          `subjects`",
     ),
-    (
-        "decay",
-        "names a column of a file, but velocities is a list; give the name of a CSV file, or the list `decays`",
-    ),
 ];
 /// Keys that say how a file of velocities is written.
 const FORMAT_KEYS: [&str; 8] =
     ["column", "unit", "separator", "decimal", "missing", "encoding", "skip_lines", "header_line"];
 /// Keys that belong to a list of velocities, and what is wrong with each beside a file.
-const OF_A_LIST: [(&str, &str); 2] = [
-    (
-        "subjects",
-        "has a subject for each of a list of velocities, but velocities is a file; name its column: \
+const OF_A_LIST: [(&str, &str); 1] = [(
+    "subjects",
+    "has a subject for each of a list of velocities, but velocities is a file; name its column: \
          subject = \"…\"",
-    ),
-    (
-        "decays",
-        "has a decay for each of a list of velocities, but velocities is a file; name its column: decay = \
-         \"…\"",
-    ),
-];
+)];
 
 /// Records the first of these keys that is there; returns whether one is.
 fn has_misplaced(reader: &mut Reader, table: &Table<'_>, keys: &[(&str, &str)]) -> bool {
@@ -349,11 +330,13 @@ fn velocities(
 ) -> Option<Measurements> {
     let path = table.path("velocities");
     let group = group_columns(reader, table);
-    let [subject, decay] = ["subject", "decay"].map(|key| column(reader, table, key));
+    let subject = column(reader, table, "subject");
+    let observables = PerObservable::new(|one| column(reader, table, one.name()));
     let known = known_columns(reader, table);
     let format = csv_format::read(reader, table);
     match &table.get("velocities")?.value {
         Value::List(_) if has_misplaced(reader, table, &OF_A_FILE) => None,
+        Value::List(_) if observables::has_column_beside_a_list(reader, table) => None,
         Value::List(_) if FORMAT_KEYS.iter().any(|key| table.has(key)) => {
             for key in FORMAT_KEYS.into_iter().filter(|key| table.has(key)) {
                 let message = "says how a file is written, but velocities is a list; leave it out";
@@ -362,11 +345,14 @@ fn velocities(
             None
         }
         Value::List(elements) => {
-            let (subjects, decays) = (subjects(reader, table), decays(reader, table));
+            let (subjects, observables) =
+                (subjects(reader, table), observables::lists(reader, table));
             let velocities = reader.numbers(&path, elements)?;
-            Some(Measurements::Velocities { velocities, subjects: subjects?, decays: decays? })
+            let (subjects, observables) = (subjects?, observables?);
+            Some(Measurements::Velocities { velocities, subjects, observables })
         }
         Value::Text(_) if has_misplaced(reader, table, &OF_A_LIST) => None,
+        Value::Text(_) if observables::has_list_beside_a_file(reader, table) => None,
         Value::Text(_) if table.has("known") && !table.has("group") => {
             let message = "has a value for each group, and there are no groups; name their column: group = \
                            \"…\"";
@@ -375,7 +361,7 @@ fn velocities(
         }
         Value::Text(_) if kind == JobKind::Propagation => None,
         Value::Text(name) => {
-            let named = NamedColumns { group: group?, subject, decay, known };
+            let named = NamedColumns { group: group?, subject, observables, known };
             let data = from_file(name, &named, &format?);
             data.map_err(|problems| record(reader, &path, &problems)).ok()
         }
@@ -445,8 +431,8 @@ fn from_file(
     let Measured { data: mut groups, origin, .. } = velocities::read(path, named, format)?;
     let measurements = match (named.group.is_empty(), groups.pop()) {
         // Without a column of groups all velocities are in one.
-        (true, Some(Group { velocities, subjects, decays, .. })) => {
-            Measurements::Velocities { velocities, subjects, decays }
+        (true, Some(Group { velocities, subjects, observables, .. })) => {
+            Measurements::Velocities { velocities, subjects, observables }
         }
         (_, last) => {
             groups.extend(last);

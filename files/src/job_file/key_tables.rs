@@ -38,7 +38,7 @@ pub fn job_table() -> String {
     let declared = settings.sections().map(|(key, section)| rows(key.name, &entries(section)));
     table(&format!(
         "{}{}{}{}{}{}{}{}{}",
-        special("data", &data_section::KEYS),
+        special("data", &data_section::keys()),
         special("parameters", &[parameters::MATERIAL]),
         row("parameters.NAME", "", "", &each),
         special("parameters.NAME", &parameters::KEYS),

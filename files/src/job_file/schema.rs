@@ -1,9 +1,10 @@
 //! The JSON Schema of job files, by which editors complete them.
 
 use osteon_common::case::Setup;
-use osteon_common::check::{COUNT, DECAY, REPEATABILITY};
+use osteon_common::check::{COUNT, REPEATABILITY};
 use osteon_common::fields::{Choice, DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
+use osteon_common::observables::Observable;
 use osteon_common::parameters::Parameter;
 use serde_json::{Map, Value as Json, json};
 
@@ -11,6 +12,7 @@ use crate::materials;
 
 use super::csv_format::{LINES, MISSING_MAX};
 use super::data_section::GROUP_COLUMNS_MAX;
+use super::observables;
 use super::{data_section, parameters, posterior, priors};
 use crate::velocities::{DecimalMark, Separator, VelocityUnit};
 
@@ -93,7 +95,11 @@ fn number(default: Option<f64>, accepted: Interval) -> Json {
     number
 }
 
-fn described(mut schema: Json, Key { meaning, .. }: Key) -> Json {
+fn described(schema: Json, Key { meaning, .. }: Key) -> Json {
+    said_to_be(schema, meaning)
+}
+
+fn said_to_be(mut schema: Json, meaning: &str) -> Json {
     schema["description"] = plain(meaning).into();
     schema
 }
@@ -103,12 +109,14 @@ fn data() -> Json {
     let list = || json!({ "type": "array", "items": above_zero() });
     let name = || json!({ "type": "string" });
     let subjects = || json!({ "type": "array", "items": { "type": "integer", "minimum": 0 } });
-    let decays = || json!({ "type": "array", "items": number(None, DECAY) });
+    let values =
+        |one: Observable| json!({ "type": "array", "items": number(None, one.row().accepted) });
     let of_group = [
         (Key { name: "velocities", meaning: "velocities of the group, m/s" }, list()),
         (Key { name: "subjects", meaning: "subject of each velocity, a whole number" }, subjects()),
-        (Key { name: "decays", meaning: "decay of each velocity, dB/cm" }, decays()),
     ];
+    let of_observables = observables::list_keys().into_iter().zip(Observable::ALL.map(values));
+    let of_group = of_group.into_iter().chain(of_observables);
     let of_group = of_group.map(|(key, schema)| (key.name.to_owned(), described(schema, key)));
     let known = |schema: &dyn Fn(Parameter) -> Json| {
         Parameter::OF_SETUP.map(|parameter| (parameter.name().to_owned(), schema(parameter)))
@@ -122,7 +130,7 @@ fn data() -> Json {
         value["description"] = format!("value that is known of the group{unit}").into();
         value
     };
-    let properties = of_group.into_iter().chain(known(&value));
+    let properties = of_group.chain(known(&value));
     let mut group = object(properties.collect::<Map<_, _>>().into());
     let column = |_| {
         let meaning = "name of the CSV column that holds the value for each group";
@@ -137,7 +145,7 @@ fn data() -> Json {
     group_columns["minItems"] = 1.into();
     let lines = || json!({ "type": "integer", "minimum": LINES.min, "maximum": LINES.max });
     // In the order of the keys.
-    let types: [Json; data_section::KEYS.len()] = [
+    let of_a_file = [
         json!({ "anyOf": [name(), list()] }),
         name(),
         choice(&VelocityUnit::default()),
@@ -149,17 +157,18 @@ fn data() -> Json {
         lines(),
         json!({ "anyOf": [name(), group_columns] }),
         name(),
-        name(),
-        columns,
-        json!({ "type": "object", "additionalProperties": group }),
-        subjects(),
-        decays(),
+    ];
+    let of_groups =
+        [columns, json!({ "type": "object", "additionalProperties": group }), subjects()];
+    let of_moments = [
         above_zero(),
         above_zero(),
         json!({ "type": "integer", "minimum": COUNT.min, "maximum": COUNT.max }),
         number(Some(0.0), REPEATABILITY),
     ];
-    let properties = data_section::KEYS.into_iter().zip(types);
+    let types = of_a_file.into_iter().chain(Observable::ALL.map(|_| name())).chain(of_groups);
+    let types = types.chain(Observable::ALL.map(values)).chain(of_moments);
+    let properties = data_section::keys().into_iter().zip(types);
     let properties = properties.map(|(key, schema)| (key.name.to_owned(), described(schema, key)));
     object(properties.collect::<Map<_, _>>().into())
 }
@@ -183,7 +192,7 @@ fn ranges() -> Json {
 }
 
 fn range(parameter: Parameter) -> Json {
-    let value = || number(None, Interval::accepted_for(parameter));
+    let value = || number(None, parameter.row().accepted);
     let bounds = json!({ "type": "array", "items": value(), "minItems": 2, "maxItems": 2 });
     let [start, bounds, fixed] = {
         let [start_key, bounds_key, fixed_key] = parameters::KEYS;
@@ -204,18 +213,18 @@ fn range(parameter: Parameter) -> Json {
         range["oneOf"] = required.to_vec().into();
         range
     };
-    described(range, Key { name: parameter.name(), meaning: meaning(parameter) })
+    said_to_be(range, &meaning(parameter))
 }
 
 fn prior(parameter: Parameter) -> Json {
     let [value, weight] = priors::KEYS;
     let properties = json!({
-        value.name: described(number(None, Interval::accepted_for(parameter)), value),
+        value.name: described(number(None, parameter.row().accepted), value),
         weight.name: described(number(None, Interval::above(0.0, "")), weight),
     });
     let mut prior = object(properties);
     prior["required"] = json!([value.name, weight.name]);
-    described(prior, Key { name: parameter.name(), meaning: meaning(parameter) })
+    said_to_be(prior, &meaning(parameter))
 }
 
 fn posterior_prior(parameter: Parameter) -> Json {
@@ -228,21 +237,14 @@ fn posterior_prior(parameter: Parameter) -> Json {
     });
     let mut prior = object(properties);
     prior["required"] = json!([distribution.name]);
-    described(prior, Key { name: parameter.name(), meaning: meaning(parameter) })
+    said_to_be(prior, &meaning(parameter))
 }
 
-fn meaning(parameter: Parameter) -> &'static str {
-    match parameter {
-        Parameter::Density => "mass density of the bone, kg/m³",
-        Parameter::LongitudinalYoungModulus => "longitudinal Young modulus, Pa",
-        Parameter::LongitudinalPoissonRatio => "longitudinal Poisson ratio",
-        Parameter::LongitudinalShearModulus => "longitudinal shear modulus, Pa",
-        Parameter::TransverseYoungModulus => "transverse Young modulus, Pa",
-        Parameter::TransversePoissonRatio => "transverse Poisson ratio",
-        Parameter::Dispersion => "dispersion of the random elasticity",
-        Parameter::BoneThickness => "thickness of the bone, m",
-        Parameter::BoneQualityFactor => "quality factor of the bone",
-        Parameter::CouplingSoundSpeed => "speed of sound of the coupling layer, m/s",
+/// Returns what a parameter is, with its unit.
+fn meaning(parameter: Parameter) -> String {
+    match parameter.unit() {
+        "" => parameter.row().meaning.to_owned(),
+        unit => format!("{}, {unit}", parameter.row().meaning),
     }
 }
 

@@ -120,7 +120,7 @@ pub(super) fn sensitivities(found: &Inference) -> BTreeMap<Parameter, MomentSlop
     let slopes = found.sensitivities.iter().map(|one| {
         let coefficient_of_variation = one.coefficient_of_variation;
         let moments = results::Moments { mean: one.mean, coefficient_of_variation }.into();
-        (one.parameter, MomentSlopes { moments, decay: one.decay })
+        (one.parameter, MomentSlopes { moments, observables: one.observables })
     });
     slopes.collect()
 }

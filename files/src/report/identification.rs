@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use osteon_common::job::{Objective, Prior, Sampling, SearchMethod};
-use osteon_common::moments::DecayEstimate;
+use osteon_common::moments::ObservableEstimates;
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{BestPoint, GroupResult, JobFailure, JobResult, PointMeaning, Status};
@@ -49,10 +49,9 @@ pub struct Identification {
     pub dispersion: Option<f64>,
     /// Moments of the model's velocities at the best point.
     pub velocity: Velocity,
-    /// Decays of the model's realizations, with the standard error of their mean by sampling; not there
-    /// where none were measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub decay: Option<DecayEstimate>,
+    /// Other observables of the model's realizations, with the standard error of each mean by sampling.
+    #[serde(flatten)]
+    pub observables: ObservableEstimates,
     /// The data; not there where they are groups.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub data: Option<Data>,
@@ -162,7 +161,7 @@ impl From<&JobResult> for Identification {
             parameters: found.parameters,
             dispersion: found.dispersion,
             velocity: best.into(),
-            decay: best.and_then(|best| best.decay),
+            observables: best.map(|best| best.observables).unwrap_or_default(),
             data: single.map(|data| Data::of_job(data, best)),
             evaluations: result.evaluations,
             realizations: result.realizations,
@@ -236,10 +235,9 @@ pub struct Group {
     pub dispersion: Option<f64>,
     /// Moments of the model's velocities at the best point.
     pub velocity: Velocity,
-    /// Decays of the model's realizations, with the standard error of their mean by sampling; not there
-    /// where none were measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub decay: Option<DecayEstimate>,
+    /// Other observables of the model's realizations, with the standard error of each mean by sampling.
+    #[serde(flatten)]
+    pub observables: ObservableEstimates,
     /// The data of the group.
     pub data: Data,
     /// Number of failed realizations at the best point, by kind; kinds that did not occur are not there.
@@ -278,7 +276,7 @@ impl Group {
             parameters: found.parameters,
             dispersion: found.dispersion,
             velocity: best.into(),
-            decay: best.and_then(|best| best.decay),
+            observables: best.map(|best| best.observables).unwrap_or_default(),
             data: Data::of_group(&group.data, best),
             failures: found.failures,
             sensitivities: inference.map(sensitivities),

@@ -1,6 +1,7 @@
 //! The objects `velocity` and `data`: moments of the model and of the data, and what is known of them.
 
-use osteon_common::moments::{ConfidenceInterval, DecayEstimate, KolmogorovTest, Outlier};
+use osteon_common::moments::{ConfidenceInterval, KolmogorovTest, ObservableEstimates, Outlier};
+use osteon_common::observables::ObservableMeans;
 use osteon_common::results::{self, BestPoint, DataSummary, Estimate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -106,9 +107,9 @@ pub struct MomentSlopes {
     /// Those of the logarithms of both moments of the velocities, by the parameter's logarithm.
     #[serde(flatten)]
     pub moments: Moments,
-    /// That of the mean decay, relative to that of the data; not there where no decays were measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub decay: Option<f64>,
+    /// Those of the means of other observables, relative to those of the data.
+    #[serde(flatten)]
+    pub observables: ObservableMeans,
 }
 
 /// Moments of the data; where velocities were measured also their intervals, those far from
@@ -118,10 +119,9 @@ pub struct Data {
     /// The moments, that of the mean in m/s.
     #[serde(flatten)]
     pub moments: Moments,
-    /// The measured decays, with the standard error of their mean by their scatter; not there where none
-    /// were measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub decay: Option<DecayEstimate>,
+    /// Other measured observables, with the standard error of each mean by their scatter.
+    #[serde(flatten)]
+    pub observables: ObservableEstimates,
     /// Confidence intervals of the moments of the law that the velocities were drawn from; not there
     /// where only moments are known, and not `data.count`, null where the velocities give none.
     #[serde(
@@ -164,7 +164,7 @@ impl Data {
         let intervals = data.intervals.map(MomentIntervals::from);
         Self {
             moments: data.moments.into(),
-            decay: data.decay,
+            observables: data.observables,
             interval: (measured || intervals.is_some()).then_some(intervals),
             kolmogorov: measured.then(|| best.and_then(|best| best.kolmogorov)),
             outliers: data.outliers.clone(),

@@ -1,6 +1,6 @@
 //! The mean model at a point.
 
-use osteon_common::parameters::{AS_IN_SETUP, Parameter, Point};
+use osteon_common::parameters::{AS_IN_SETUP, PARAMETERS, Parameter, Point};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,20 +31,35 @@ pub struct MeanModel {
 }
 
 impl MeanModel {
+    /// Returns the value of a parameter of the mean model, or of the setup; `None` of the dispersion.
+    pub fn get(&self, parameter: Parameter) -> Option<f64> {
+        match parameter {
+            Parameter::Density => self.density,
+            Parameter::LongitudinalYoungModulus => self.longitudinal_young_modulus,
+            Parameter::LongitudinalPoissonRatio => self.longitudinal_poisson_ratio,
+            Parameter::LongitudinalShearModulus => self.longitudinal_shear_modulus,
+            Parameter::TransverseYoungModulus => self.transverse_young_modulus,
+            Parameter::TransversePoissonRatio => self.transverse_poisson_ratio,
+            Parameter::Dispersion => None,
+            Parameter::BoneThickness => self.bone_thickness,
+            Parameter::BoneQualityFactor => self.bone_quality_factor,
+            Parameter::CouplingSoundSpeed => self.coupling_sound_speed,
+        }
+    }
+
     /// The whole point, with this dispersion; `None` where a number is missing.
     pub fn point(&self, dispersion: Option<f64>) -> Option<Point> {
-        Some(Point([
-            self.density?,
-            self.longitudinal_young_modulus?,
-            self.longitudinal_poisson_ratio?,
-            self.longitudinal_shear_modulus?,
-            self.transverse_young_modulus?,
-            self.transverse_poisson_ratio?,
-            dispersion?,
-            self.bone_thickness.unwrap_or(AS_IN_SETUP),
-            self.bone_quality_factor.unwrap_or(AS_IN_SETUP),
-            self.coupling_sound_speed.unwrap_or(AS_IN_SETUP),
-        ]))
+        let mut point = Point([AS_IN_SETUP; PARAMETERS]);
+        for parameter in Parameter::ALL {
+            let value = match parameter {
+                Parameter::Dispersion => dispersion,
+                _ => self.get(parameter),
+            };
+            let is_required = parameter.of_setup().is_none();
+            point.0[parameter as usize] =
+                if is_required { value? } else { value.unwrap_or(AS_IN_SETUP) };
+        }
+        Some(point)
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use osteon_common::job::Group;
 use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::limits;
+use osteon_common::observables::PerObservable;
 use osteon_common::origin::Origin;
 use osteon_common::parameters::Parameter;
 
@@ -56,8 +57,8 @@ struct CollectedGroup {
     subjects: Vec<u32>,
     /// Numbers of the subjects, by their names.
     numbers: BTreeMap<String, u32>,
-    /// Decay of each velocity; empty if there is no such column.
-    decays: Vec<f64>,
+    /// Other observables of each velocity; empty if there is no such column.
+    observables: PerObservable<Vec<f64>>,
     /// Quantities that are known of the group.
     known: [Option<f64>; Parameter::OF_SETUP.len()],
 }
@@ -131,7 +132,9 @@ impl CollectedVelocities {
         self.account.take(line, row.velocity, row.has_error);
         let group = &mut self.groups[place];
         group.velocities.push(row.velocity);
-        group.decays.extend(row.decay);
+        for (observable, value) in row.observables.present() {
+            group.observables[observable].push(*value);
+        }
         // The limit on a file's bytes keeps the number of lines far below this.
         group.lines.push(u32::try_from(line).unwrap_or(u32::MAX));
         if let Some(subject) = row.subject.filter(|_| !self.is_index) {
@@ -157,12 +160,14 @@ impl CollectedVelocities {
         let account = self.account;
         let mut measured =
             Measured { data: Vec::with_capacity(self.groups.len()), origin, account };
-        for CollectedGroup { name, velocities, lines, subjects, decays, known, .. } in self.groups {
+        for CollectedGroup { name, velocities, lines, subjects, observables, known, .. } in
+            self.groups
+        {
             let subjects = self.has_subjects.then_some(subjects);
             let known = KnownQuantities::new(known);
-            // Rows have a decay each, or none has.
-            let decays = (!decays.is_empty()).then_some(decays);
-            measured.data.push(Group { name, velocities, subjects, decays, known });
+            // Rows have a value of an observable each, or none has.
+            let observables = observables.map(|values| (!values.is_empty()).then_some(values));
+            measured.data.push(Group { name, velocities, subjects, observables, known });
             measured.origin.lines.push(lines);
         }
         measured
@@ -172,8 +177,8 @@ impl CollectedVelocities {
 impl CollectedGroup {
     fn new(name: String, known: [Option<f64>; Parameter::OF_SETUP.len()]) -> Self {
         let (velocities, lines, subjects) = (Vec::new(), Vec::new(), Vec::new());
-        let (decays, numbers) = (Vec::new(), BTreeMap::new());
-        Self { name, velocities, lines, subjects, decays, numbers, known }
+        let (observables, numbers) = (PerObservable::default(), BTreeMap::new());
+        Self { name, velocities, lines, subjects, observables, numbers, known }
     }
 
     /// Adds the subject of a velocity; returns whether it is a new one.

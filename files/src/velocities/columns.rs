@@ -1,6 +1,7 @@
 //! The columns of a table that a job uses, and its rows.
 
-use osteon_common::check::{DECAY, VELOCITY};
+use osteon_common::check::VELOCITY;
+use osteon_common::observables::{Observable, PerObservable};
 use osteon_common::parameters::Parameter;
 
 use super::column_choice::ColumnChoice;
@@ -17,8 +18,8 @@ pub(crate) struct NamedColumns<'a> {
     pub(crate) group: Vec<&'a str>,
     /// The column of the subject of each velocity.
     pub(crate) subject: Option<&'a str>,
-    /// The column of the decay that was measured with each velocity.
-    pub(crate) decay: Option<&'a str>,
+    /// The columns of other observables that were measured with each velocity.
+    pub(crate) observables: PerObservable<Option<&'a str>>,
     /// The columns of quantities that are known of each group, for each of [`Parameter::OF_SETUP`].
     pub(crate) known: [Option<&'a str>; Parameter::OF_SETUP.len()],
 }
@@ -29,7 +30,7 @@ pub(super) struct Columns<'a> {
     velocity: NamedColumn,
     group: Vec<NamedColumn>,
     subject: Option<NamedColumn>,
-    decay: Option<NamedColumn>,
+    observables: PerObservable<Option<NamedColumn>>,
     known: [Option<NamedColumn>; Parameter::OF_SETUP.len()],
     /// A column that seems to name subjects, if none is named.
     like_subjects: Option<NamedColumn>,
@@ -58,8 +59,8 @@ pub(super) struct Row {
     pub(super) velocity: f64,
     /// Whether an error follows the velocity in its cell.
     pub(super) has_error: bool,
-    /// Decay, dB/cm, if there is a column of decays.
-    pub(super) decay: Option<f64>,
+    /// Other observables, each in its unit, if there is a column of it.
+    pub(super) observables: PerObservable<Option<f64>>,
     /// Quantities that are known of the group.
     pub(super) known: [Option<f64>; Parameter::OF_SETUP.len()],
 }
@@ -87,7 +88,10 @@ impl<'a> Columns<'a> {
         let group = named.group.iter().map(|name| column(Some(name), "group"));
         let group: Vec<_> = group.filter_map(Result::transpose).collect::<Result<_, _>>()?;
         let subject = column(named.subject, "subject")?;
-        let decay = column(named.decay, "decay")?;
+        let mut observables = PerObservable::default();
+        for (observable, name) in named.observables.iter() {
+            observables[observable] = column(*name, observable.name())?;
+        }
         let is_like = |name: &&String| {
             is_like_subject(&name.to_lowercase()) && !named.group.contains(&name.as_str())
         };
@@ -99,7 +103,7 @@ impl<'a> Columns<'a> {
             *found = column(name, "value")?;
         }
         let choice = &table.choice;
-        Ok(Self { choice, velocity, group, subject, decay, known, like_subjects })
+        Ok(Self { choice, velocity, group, subject, observables, known, like_subjects })
     }
 
     /// Returns what a row says; `None` if a value is missing.
@@ -116,18 +120,21 @@ impl<'a> Columns<'a> {
             (None, None) => None,
         };
         let number = |text: &str| self.choice.decimal.number(text);
-        let decay =
-            self.decay.as_ref().map(|column| column.decay_in(&fields, number)).transpose()?;
+        let mut observables = PerObservable::default();
+        for (observable, column) in self.observables.present() {
+            observables[observable] = Some(column.observed_in(observable, &fields, number)?);
+        }
         let mut known = [None; Parameter::OF_SETUP.len()];
         for (value, column) in known.iter_mut().zip(&self.known) {
             *value = column.as_ref().map(|column| column.number_in(&fields, number)).transpose()?;
         }
-        Ok(Some(Row { group, subject, velocity, has_error, decay, known }))
+        Ok(Some(Row { group, subject, velocity, has_error, observables, known }))
     }
 
     /// Returns the columns that must have a value in each row.
     fn used(&self) -> impl Iterator<Item = &NamedColumn> {
-        let optional = [&self.subject, &self.decay].into_iter().chain(&self.known);
+        let observables = self.observables.iter().map(|(_, column)| column);
+        let optional = [&self.subject].into_iter().chain(observables).chain(&self.known);
         [&self.velocity].into_iter().chain(&self.group).chain(optional.flatten())
     }
 
@@ -183,15 +190,19 @@ impl NamedColumn {
 }
 
 impl NamedColumn {
-    fn decay_in(
+    fn observed_in(
         &self,
+        observable: Observable,
         fields: &[String],
         number: impl Fn(&str) -> Option<f64>,
     ) -> Result<f64, Problem> {
         let text = fields[self.place].as_str();
         match number(text) {
-            Some(decay) if DECAY.contains(decay) => Ok(decay),
-            _ => Err(Problem::NoDecay { column: shortened(&self.name), found: shortened(text) }),
+            Some(value) if observable.row().accepted.contains(value) => Ok(value),
+            _ => {
+                let (column, found) = (shortened(&self.name), shortened(text));
+                Err(Problem::NotObserved { column, found, observable })
+            }
         }
     }
 

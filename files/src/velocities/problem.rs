@@ -3,6 +3,7 @@
 use std::io;
 
 use osteon_common::check::VELOCITY;
+use osteon_common::observables::Observable;
 use osteon_common::{limits, visible};
 use thiserror::Error;
 
@@ -219,10 +220,13 @@ pub(crate) enum Problem {
     #[error("{column} is empty; it must be a number (SI units), the same in all rows of a group")]
     NoKnownValue { column: String },
     #[error(
-        "{column} is {found:?}; it must be the decay of the velocity in dB/cm, a number from -100 to 100 (a \
-         row without a decay cannot be used with [data] decay: leave it out of the file)"
+        "{column} is {found:?}; it must be the {} measured with the velocity, {} (a row without one cannot \
+         be used with [data] {}: leave it out of the file)",
+        .observable.row().title,
+        .observable.row().accepted,
+        .observable.name()
     )]
-    NoDecay { column: String, found: String },
+    NotObserved { column: String, found: String, observable: Observable },
     #[error(
         "{column} is {found:?}; it must be a number (SI units), the same in all rows of a group"
     )]

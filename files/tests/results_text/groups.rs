@@ -63,7 +63,7 @@ fn grouped() -> (JobSpecification, JobResult, Vec<Evaluation>) {
         role: EvaluationRole { group, varied, ..EvaluationRole::default() },
         point: POINT,
         moments: None,
-        decay: None,
+        observables: osteon_common::observables::PerObservable::default(),
         cost: None,
         failures: FailureCounts::default(),
         estimated_error: None,

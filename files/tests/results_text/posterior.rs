@@ -215,7 +215,7 @@ fn the_history_is_that_of_the_search() {
         role,
         point: POINT,
         moments: Some(moments(3906.5, 0.0271)),
-        decay: None,
+        observables: osteon_common::observables::PerObservable::default(),
         cost: Some(1e-3),
         failures: FailureCounts::default(),
         estimated_error: None,

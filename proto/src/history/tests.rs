@@ -1,5 +1,6 @@
 //! Tests of the conversion of the history to and from messages.
 
+use osteon_common::observables::PerObservable;
 use osteon_common::parameters::{AS_IN_SETUP, BONE_PARAMETERS, Parameter, Point};
 use osteon_common::results::Status;
 use osteon_fuzz::properties;
@@ -61,12 +62,15 @@ properties! {
         cost in cost(),
         failures in failures(),
         estimated_error in estimated_error(),
-        decay in proptest::option::of(number()),
+        has in any::<[bool; 3]>(),
+        observed in number(),
     ) {
         let varied = varied.map(|k| Parameter::ALL[k]);
+        let has = PerObservable(has);
+        let observables = has.map(|has| has.then_some(observed));
         let role = EvaluationRole { group, start, varied, posterior };
         let evaluation =
-            Evaluation { number, role, point, moments, decay, cost, failures, estimated_error };
+            Evaluation { number, role, point, moments, observables, cost, failures, estimated_error };
         let message = evaluation_to_message(&evaluation);
         prop_assert_eq!(evaluation_from_message(&message), Ok(evaluation));
     }

@@ -7,7 +7,6 @@ use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::course::SearchCourse;
 use crate::finding::Finding;
 use crate::number::digits;
-use crate::quantity::{symbol, words};
 
 /// Most evaluations that are drawn: the lines of more are thinned.
 const ROWS_MAX: usize = 600;
@@ -126,7 +125,7 @@ fn parameters(course: &SearchCourse) -> Option<Figure> {
     let title = format!("Parameters within their bounds{}", course.suffix);
     let name = format!("{}search-parameters", course.prefix);
     let mut chart = Chart::new(name, title, Axis::linear(X), y);
-    let names = free.iter().map(|one| format!("{} ({})", symbol(*one), words(*one)));
+    let names = free.iter().map(|one| format!("{} ({})", one.row().symbol, one.row().title));
     chart.description = names.collect::<Vec<_>>().join(", ");
     for (place, parameter) in free.iter().enumerate() {
         let values: Vec<f64> = course.rows.iter().map(|row| row.within[place]).collect();
@@ -136,9 +135,13 @@ fn parameters(course: &SearchCourse) -> Option<Figure> {
         {
             // Colours repeat after four.
             let at = [end[0] * 0.985, end[1]];
-            chart.layer("", Ink::nth(place), Shape::Texts(vec![(at, symbol(*parameter).into())]));
+            chart.layer(
+                "",
+                Ink::nth(place),
+                Shape::Texts(vec![(at, parameter.row().symbol.into())]),
+            );
         }
-        chart.layer(symbol(*parameter), Ink::nth(place), Shape::Line(line));
+        chart.layer(parameter.row().symbol, Ink::nth(place), Shape::Line(line));
     }
     let reading = "Each line is one free parameter. One that still moves while the cost is level is \
                    not determined by the data; one that ends at 0 or 1 is held by its bound, which \

@@ -5,7 +5,7 @@ use osteon_common::parameters::Parameter;
 use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
-use crate::quantity::{symbol, unit, words};
+use crate::quantity::unit;
 use crate::sample::VelocitySample;
 
 /// Returns a figure for each free parameter.
@@ -24,9 +24,9 @@ fn figure(finding: &Finding<'_>, parameter: Parameter) -> Option<Figure> {
         groups.as_ref().is_none_or(|groups| Some(groups[*row]) == finding.group)
     });
     let draws = VelocitySample::new(draws.map(|(_, value)| value / unit.size).collect())?;
-    let label = unit.axis_label(&format!("{} {}", words(parameter), symbol(parameter)));
+    let label = unit.axis_label(&format!("{} {}", parameter.row().title, parameter.row().symbol));
     let file = format!("{}posterior-{}", finding.prefix(), parameter.name().replace('_', "-"));
-    let title = format!("Posterior of the {}{}", words(parameter), finding.suffix());
+    let title = format!("Posterior of the {}{}", parameter.row().title, finding.suffix());
     let mut chart = Chart::new(file, title, Axis::linear(label), Axis::linear("density"));
     chart.description = format!("{} draws.", draws.len());
     chart.layer("draws", Ink::First, Shape::Bars(draws.histogram()));

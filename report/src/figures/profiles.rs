@@ -3,7 +3,7 @@
 use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
-use crate::quantity::{symbol, unit, words};
+use crate::quantity::unit;
 
 /// Returns a figure for each profile.
 pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
@@ -11,12 +11,13 @@ pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let figure = |(parameter, profile): (&_, &osteon_files::report::ParameterProfile)| {
         let parameter = *parameter;
         let unit = unit(parameter);
-        let label = unit.axis_label(&format!("{} {}", words(parameter), symbol(parameter)));
+        let label =
+            unit.axis_label(&format!("{} {}", parameter.row().title, parameter.row().symbol));
         let points = profile.values.iter().zip(&profile.costs);
         let points: Vec<[f64; 2]> =
             points.map(|(value, cost)| [value / unit.size, cost.unwrap_or(f64::NAN)]).collect();
         let file = format!("{}profile-{}", finding.prefix(), parameter.name().replace('_', "-"));
-        let title = format!("Profile of the {}{}", words(parameter), finding.suffix());
+        let title = format!("Profile of the {}{}", parameter.row().title, finding.suffix());
         let y = Axis::linear("lowest cost");
         let mut chart = Chart::new(file, title, Axis::linear(label), y);
         chart.description = format!("{} values from bound to bound.", points.len());

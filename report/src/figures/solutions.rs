@@ -3,7 +3,6 @@
 use super::figure::Figure;
 use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
-use crate::quantity::{symbol, words};
 
 /// Most solutions that are drawn.
 const DRAWN_MAX: usize = 60;
@@ -16,12 +15,12 @@ pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     if free.len() < 2 || solutions.points.is_empty() {
         return Vec::new();
     }
-    let names = free.iter().map(|parameter| symbol(*parameter).to_owned()).collect();
+    let names = free.iter().map(|parameter| parameter.row().symbol.to_owned()).collect();
     let x = Axis::with_categories("free parameter", names);
     let y = Axis::linear("place between the bounds (0: lower, 1: upper)").with_ends(0.0, 1.0);
     let title = format!("Solutions from {} starts{}", solutions.points.len(), finding.suffix());
     let mut chart = Chart::new(format!("{}solutions", finding.prefix()), title, x, y);
-    let described = free.iter().map(|one| format!("{} ({})", symbol(*one), words(*one)));
+    let described = free.iter().map(|one| format!("{} ({})", one.row().symbol, one.row().title));
     chart.description = format!(
         "{} of {} solutions match the data. Parameters: {}.",
         solutions.matching,

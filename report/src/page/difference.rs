@@ -7,7 +7,7 @@ use super::groups::difference;
 use super::markup::table as markup_table;
 use crate::finding::Finding;
 use crate::input::{ReportedRun, RunContent};
-use crate::quantity::{NUMBER, Unit, VELOCITY, symbol, unit, words};
+use crate::quantity::{NUMBER, Unit, VELOCITY, unit};
 use crate::sample::NORMAL_95;
 use crate::text::{escape, shorten};
 
@@ -84,7 +84,7 @@ fn findings_table(all: &[(String, usize, &Finding<'_>)]) -> String {
     });
     add("√(c₁₁₁₁/ρ)".to_owned(), VELOCITY, &bulk_velocity);
     for parameter in Parameter::ALL {
-        let name = format!("{} {}", words(parameter), symbol(parameter));
+        let name = format!("{} {}", parameter.row().title, parameter.row().symbol);
         add(name, unit(parameter), &|one| determined_estimate(one, parameter));
     }
     let mut out = markup_table("Differences from the first, with 95 % intervals", &columns, &rows);

@@ -6,7 +6,7 @@ use osteon_files::report::{Moment, QuantityEstimate};
 
 use super::markup::{Numbers, none, table, width_precision};
 use crate::finding::Finding;
-use crate::quantity::{NUMBER, Precision, Unit, VELOCITY, symbol, unit, words};
+use crate::quantity::{NUMBER, Precision, Unit, VELOCITY, unit};
 use crate::text::escape;
 
 /// Returns the tables: the moments, what the data determine, and the parameters.
@@ -129,7 +129,7 @@ fn parameters(numbers: &Numbers, finding: &Finding<'_>) -> String {
 
 fn parameter_row(numbers: &Numbers, finding: &Finding<'_>, parameter: Parameter) -> Vec<String> {
     let unit = unit(parameter);
-    let heading = with_unit(&format!("{} {}", words(parameter), symbol(parameter)), unit);
+    let heading = with_unit(&format!("{} {}", parameter.row().title, parameter.row().symbol), unit);
     let (value, place) = finding.value(parameter);
     let (lower, upper) = match finding.range(parameter) {
         Range::Fixed(_) => {

@@ -205,7 +205,7 @@ fn parameters_verdict(finding: &Finding<'_>) -> Option<Verdict> {
         if finding.posterior.is_some() {
             " The posterior says how far they may lie."
         } else {
-            " Fix parameters, add decays, or ask for a posterior."
+            " Fix parameters, add other observables, or ask for a posterior."
         }
     );
     Some(verdict(Bearing::Caution, "Parameters", words))

@@ -9,7 +9,7 @@ use osteon_common::job::{
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, Status};
 
-mod decays;
+mod observables;
 
 use super::*;
 
@@ -40,9 +40,7 @@ fn speeds(realizations: &Realizations) -> Vec<RealizationResult> {
         let bone = realizations.ensemble.bone(index).unwrap();
         (bone.elasticity.rows()[0][0] / bone.density).sqrt()
     };
-    let solved =
-        |index| RealizationResult { outcome: Ok(speed(index)), estimated_error: 1e-5, decay: 0.0 };
-    (0..realizations.count).map(solved).collect()
+    (0..realizations.count).map(|index| RealizationResult::solved(speed(index), 1e-5)).collect()
 }
 
 fn identified(specification: &JobSpecification) -> CompletedJob {
@@ -61,8 +59,8 @@ fn the_result_is_that_of_the_search() {
                     let MonteCarlo { realizations: count, .. } = specification.monte_carlo;
                     let germs = specification.monte_carlo.germs();
                     let ensemble = Ensemble::drawn(&point, germs).unwrap();
-                    let solved =
-                        speeds(&Realizations { point, ensemble, count, with_decays: false });
+                    let observables = ObservableSet::NONE;
+                    let solved = speeds(&Realizations { point, ensemble, count, observables });
                     search.tell(solved.iter().map(|one| one.outcome).collect(), errors);
                 }
                 Step::Done(ending) => break ending,
@@ -128,13 +126,12 @@ fn what_no_worker_answers_is_refused() {
     let few = refused(|solved| Ok(solved[1..].to_vec()));
     assert_eq!(few, "evaluation 2 has 49 outcomes; it must have 50, one of each realization");
     for wrong in [
-        RealizationResult { outcome: Ok(f64::NAN), estimated_error: 0.0, decay: 0.0 },
-        RealizationResult { outcome: Ok(-1.0), estimated_error: 0.0, decay: 0.0 },
-        RealizationResult { outcome: Ok(3900.0), estimated_error: -1e-5, decay: 0.0 },
+        RealizationResult::solved(f64::NAN, 0.0),
+        RealizationResult::solved(-1.0, 0.0),
+        RealizationResult::solved(3900.0, -1e-5),
         RealizationResult {
-            outcome: Err(FailureKind::NoArrival),
             estimated_error: 1e-5,
-            decay: 0.0,
+            ..RealizationResult::failed(FailureKind::NoArrival)
         },
     ] {
         let text = refused(|mut solved| {

@@ -1,9 +1,10 @@
 //! The model of the moments: the closed form, corrected by the evaluations.
 //!
-//! The model's logarithms of mean velocity and coefficient of variation at x are
+//! The model's logarithms of mean velocity and coefficient of variation at x, and the means of other
+//! observables, are
 //!
 //! ```text
-//! y(x) = s(x) + e + E (x - x_k),    s = (ln √(c1111/ρ), ln δ),
+//! y(x) = s(x) + e + E (x - x_k),    s = (ln √(c1111/ρ), ln δ, 0 for other observables),
 //! ```
 //!
 //! where the offset e makes y exact at the evaluated point x_k, and the slopes E are learnt from
@@ -11,17 +12,17 @@
 //! SIAM J. Numer. Anal. 18, 1981), which for E alone is Broyden's own update (Math. Comp. 19,
 //! 1965). The strongly curved part is s, which is known; the rest is nearly constant.
 
+use std::array;
+
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::ensemble::Germs;
 use osteon_common::inference::MomentWeights;
+use osteon_common::moments::{MOMENTS, MomentVector};
 use osteon_common::parameters::{PARAMETERS, Parameter};
 
 use crate::search_box::{SearchBox, admissible};
 
 use super::nearest::{Rows, dot, nearest, norm};
-
-/// Logarithms of mean velocity (m/s) and coefficient of variation.
-pub(super) type Logarithms = [f64; 2];
 
 /// Maximum number of linearisations of the closed form on the way to its solution. Four to eight
 /// are usual; where the matching points are strongly curved, a hundred.
@@ -66,7 +67,7 @@ pub(super) struct Model {
     /// x_k.
     at: Vec<f64>,
     /// e.
-    offset: Logarithms,
+    offset: MomentVector,
     /// E.
     slopes: Rows,
     /// Weights of the cost where it has no zero; of relative squares without.
@@ -87,7 +88,7 @@ enum Goal {
 struct Descent<'a> {
     goal: Goal,
     start: &'a [f64],
-    target: Logarithms,
+    target: MomentVector,
     linearisations_max: usize,
     /// The descent stops near this end of an earlier descent.
     other: Option<&'a [f64]>,
@@ -95,8 +96,8 @@ struct Descent<'a> {
 
 impl Model {
     /// Creates the model that consists of the closed form and this offset only.
-    pub(super) fn new(space: SearchBox, at: Vec<f64>, offset: Logarithms) -> Self {
-        let slopes = [vec![0.0; at.len()], vec![0.0; at.len()]];
+    pub(super) fn new(space: SearchBox, at: Vec<f64>, offset: MomentVector) -> Self {
+        let slopes = array::from_fn(|_| vec![0.0; at.len()]);
         Self { space, at, offset, slopes, weights: None }
     }
 
@@ -106,7 +107,7 @@ impl Model {
     }
 
     /// Makes the model exact at `at`, where `found` was evaluated.
-    pub(super) fn make_exact_at(&mut self, at: &[f64], found: Logarithms) {
+    pub(super) fn make_exact_at(&mut self, at: &[f64], found: MomentVector) {
         let Some((closed, _)) = closed_form(&self.space, at) else { return };
         self.offset = difference(found, closed);
         self.at = at.to_vec();
@@ -114,7 +115,7 @@ impl Model {
 
     /// Broyden's update: the smallest change of the slopes with which the model is exact both at
     /// `at`, where `found` was evaluated, and at its present point.
-    pub(super) fn update_slopes(&mut self, at: &[f64], found: Logarithms) {
+    pub(super) fn update_slopes(&mut self, at: &[f64], found: MomentVector) {
         let step = subtract(at, &self.at);
         let square = dot(&step, &step);
         let Some((predicted, _)) = self.predict(at) else { return };
@@ -131,7 +132,7 @@ impl Model {
 
     /// Corrects the slopes along one axis, from `found` at a point that differs from the model's
     /// own in that coordinate only.
-    pub(super) fn correct_slope(&mut self, axis: usize, at: &[f64], found: Logarithms) {
+    pub(super) fn correct_slope(&mut self, axis: usize, at: &[f64], found: MomentVector) {
         let step = at[axis] - self.at[axis];
         let Some((predicted, _)) = self.predict(at) else { return };
         for (slopes, error) in self.slopes.iter_mut().zip(difference(found, predicted)) {
@@ -154,7 +155,7 @@ impl Model {
     ///
     /// The solutions form a curved surface, which may have several points that are locally nearest
     /// to the start. A descent ends at one of these.
-    pub(super) fn nearest(&self, start: &[f64], target: Logarithms) -> Vec<f64> {
+    pub(super) fn nearest(&self, start: &[f64], target: MomentVector) -> Vec<f64> {
         let mut nearest = self.nearest_from_here(start, target);
         if !self.solves(&nearest, target) {
             return nearest;
@@ -189,7 +190,7 @@ impl Model {
     /// and where these converge, the line from the start is normal to the model's solutions (within
     /// the active bounds). Where the solutions are curved more strongly than the sphere around the
     /// start, full steps would oscillate, so the steps are shortened.
-    pub(super) fn nearest_from_here(&self, start: &[f64], target: Logarithms) -> Vec<f64> {
+    pub(super) fn nearest_from_here(&self, start: &[f64], target: MomentVector) -> Vec<f64> {
         let mut at = self.at.clone();
         for goal in [Goal::Logarithms, Goal::Cost] {
             let linearisations_max = LINEARISATIONS_MAX;
@@ -207,7 +208,7 @@ impl Model {
     }
 
     /// Returns whether this point solves the model for `target`.
-    fn solves(&self, at: &[f64], target: Logarithms) -> bool {
+    fn solves(&self, at: &[f64], target: MomentVector) -> bool {
         let missed = self.predict(at).map(|(predicted, _)| difference(predicted, target));
         missed.is_some_and(|missed| missed.iter().all(|d| d.abs() < SOLVED))
     }
@@ -235,23 +236,24 @@ impl Model {
         false
     }
 
-    /// Returns two equations, linear in the coordinates, that express that `goal` is reached.
-    fn linear(&self, goal: Goal, at: &[f64], target: Logarithms) -> Option<(Rows, [f64; 2])> {
+    /// Returns equations, linear in the coordinates, that express that `goal` is reached.
+    fn linear(&self, goal: Goal, at: &[f64], target: MomentVector) -> Option<(Rows, MomentVector)> {
         let (predicted, mut rows) = self.predict(at)?;
         let mut residual = difference(predicted, target);
         if let (Goal::Cost, Some(weights)) = (goal, &self.weights) {
             residual = weights.whiten(residual);
-            let columns = (0..at.len()).map(|axis| weights.whiten([rows[0][axis], rows[1][axis]]));
-            let columns: Vec<[f64; 2]> = columns.collect();
-            rows = [0, 1].map(|i| columns.iter().map(|column| column[i]).collect());
+            let whitened = |axis: usize| weights.whiten(array::from_fn(|i| rows[i][axis]));
+            let columns: Vec<MomentVector> = (0..at.len()).map(whitened).collect();
+            rows = array::from_fn(|i| columns.iter().map(|column| column[i]).collect());
         } else if goal == Goal::Cost {
-            for (row, residual) in rows.iter_mut().zip(&mut residual) {
+            // Those of the velocities; the others are relative differences already.
+            for (row, residual) in rows.iter_mut().zip(&mut residual).take(2) {
                 let ratio = libm::exp(*residual);
                 row.iter_mut().for_each(|slope| *slope *= ratio);
                 *residual = ratio - 1.0;
             }
         }
-        let right = [0, 1].map(|i| dot(&rows[i], at) - residual[i]);
+        let right = array::from_fn(|i| dot(&rows[i], at) - residual[i]);
         Some((rows, right))
     }
 
@@ -270,29 +272,35 @@ impl Model {
 
     /// Returns the model's value and Jacobian at a point; `None` where the closed form is
     /// undefined.
-    pub(super) fn predict(&self, at: &[f64]) -> Option<(Logarithms, Rows)> {
+    pub(super) fn predict(&self, at: &[f64]) -> Option<(MomentVector, Rows)> {
         let (closed, mut rows) = closed_form(&self.space, at)?;
         let step = subtract(at, &self.at);
         for (row, slopes) in rows.iter_mut().zip(&self.slopes) {
             row.iter_mut().zip(slopes).for_each(|(slope, learnt)| *slope += learnt);
         }
-        Some(([0, 1].map(|i| closed[i] + (self.offset[i] + dot(&self.slopes[i], &step))), rows))
+        let value = |i: usize| closed[i] + (self.offset[i] + dot(&self.slopes[i], &step));
+        Some((array::from_fn(value), rows))
     }
 }
 
-/// Returns ln √(c1111/ρ) and ln δ with their derivatives with respect to the coordinates.
-fn closed_form(space: &SearchBox, at: &[f64]) -> Option<(Logarithms, Rows)> {
+/// Returns ln √(c1111/ρ), ln δ and 0 for each observable, with their derivatives with respect to the
+/// coordinates.
+fn closed_form(space: &SearchBox, at: &[f64]) -> Option<(MomentVector, Rows)> {
     let point = space.point(at);
     let velocity = bulk_velocity(&point).ok()?;
     let dispersion = point.dispersion();
     let mut of_dispersion = [0.0; PARAMETERS];
     of_dispersion[Parameter::Dispersion as usize] = 1.0 / dispersion;
-    let rows = [space.per_edge(&velocity.gradient), space.per_edge(&of_dispersion)];
-    (dispersion > 0.0).then(|| ([velocity.logarithm, libm::log(dispersion)], rows))
+    let mut rows: Rows = array::from_fn(|_| vec![0.0; at.len()]);
+    rows[0] = space.per_edge(&velocity.gradient);
+    rows[1] = space.per_edge(&of_dispersion);
+    let mut closed = [0.0; MOMENTS];
+    (closed[0], closed[1]) = (velocity.logarithm, libm::log(dispersion));
+    (dispersion > 0.0).then_some((closed, rows))
 }
 
-fn difference(a: Logarithms, b: Logarithms) -> Logarithms {
-    [a[0] - b[0], a[1] - b[1]]
+fn difference(a: MomentVector, b: MomentVector) -> MomentVector {
+    array::from_fn(|i| a[i] - b[i])
 }
 
 /// Returns a - b.

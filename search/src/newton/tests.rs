@@ -12,6 +12,7 @@ use proptest::prelude::*;
 use super::nearest::dot;
 use super::*;
 use crate::search_box::admissible;
+use osteon_common::moments::Moments;
 
 mod nearest_of_all;
 
@@ -95,7 +96,7 @@ fn search(
     settings: Settings,
     moments: impl Fn(&Point) -> Option<Moments>,
 ) -> Found {
-    finish(Newton::new(space, data, settings), space, data, moments)
+    finish(Newton::new(space, data.into(), settings), space, data, moments)
 }
 
 fn finish(
@@ -123,7 +124,7 @@ fn finish(
         if told < cost {
             (cost, at) = (told, pending);
         }
-        newton.tell(told, found);
+        newton.tell(told, found.map(Into::into));
     }
 }
 
@@ -131,8 +132,11 @@ fn finish(
 /// linearised there by central differences of the moments themselves; and that solution's distance
 /// from the start.
 fn off_nearest(space: SearchBox, at: &[f64], moments: &dyn Fn(&Point) -> Moments) -> (f64, f64) {
-    let y = |at: &[f64]| logarithms(moments(&space.point(at)));
-    let mut rows = [vec![0.0; at.len()], vec![0.0; at.len()]];
+    let y = |at: &[f64]| {
+        let moments = moments(&space.point(at));
+        [moments.mean, moments.coefficient_of_variation].map(libm::log)
+    };
+    let mut rows: Rows = std::array::from_fn(|_| vec![0.0; at.len()]);
     for axis in 0..at.len() {
         let mut moved = [at.to_vec(), at.to_vec()];
         moved[0][axis] = (at[axis] - 1e-6).max(0.0);
@@ -141,7 +145,7 @@ fn off_nearest(space: SearchBox, at: &[f64], moments: &dyn Fn(&Point) -> Moments
         let width = moved[1][axis] - moved[0][axis];
         (0..2).for_each(|i| rows[i][axis] = (above[i] - below[i]) / width);
     }
-    let right = [0, 1].map(|i| dot(&rows[i], at));
+    let right = std::array::from_fn(|i| dot(&rows[i], at));
     let expected = nearest::nearest(&space.start(), &rows, right);
     (norm(&subtract(&expected, at)), norm(&subtract(&expected, &space.start())))
 }
@@ -194,7 +198,7 @@ fn a_search_from_the_solution_of_the_closed_form_takes_fewer_evaluations() {
             continue;
         }
         let usual = search(space, data, SETTINGS, |point| Some(bone(point)));
-        let newton = || Newton::new(space, data, SETTINGS).from_solution();
+        let newton = || Newton::new(space, data.into(), SETTINGS).from_solution();
         let found = finish(newton(), space, data, |point| Some(bone(point)));
         assert_eq!(found.stop, StopReason::CostReached, "{index}: {found:?}");
         let (off, distance) = off_nearest(space, &found.at, &bone);
@@ -247,7 +251,7 @@ properties! {
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
         let settings = Settings { max_evaluations: 3000, cost_tolerance: 0.0, size_tolerance };
-        let mut newton = Newton::new(space, bone(&OPTIMUM), settings);
+        let mut newton = Newton::new(space, bone(&OPTIMUM).into(), settings);
         let mut turns = 0;
         while let Proposal::Evaluate(at) = newton.ask() {
             prop_assert!(at.iter().all(|u| (0.0..=1.0).contains(u)));
@@ -260,9 +264,9 @@ properties! {
             match (8.0 * random()) as u32 {
                 0 => newton.refuse(),
                 1 => newton.tell(f64::INFINITY, None),
-                2 => newton.tell(f64::NAN, Some(moments)),
-                3 => newton.tell(random(), Some(Moments { mean: f64::NAN, ..moments })),
-                _ => newton.tell(random(), Some(moments)),
+                2 => newton.tell(f64::NAN, Some(moments.into())),
+                3 => newton.tell(random(), Some(Moments { mean: f64::NAN, ..moments }.into())),
+                _ => newton.tell(random(), Some(moments.into())),
             }
         }
         prop_assert!(newton.evaluations() <= 3000);
@@ -438,7 +442,7 @@ fn the_points_that_measure_slopes_are_foreseen() {
     // No point matches: slopes are measured before the search gives up.
     let space = all_free(&[0.5; 7]);
     let data = Moments { mean: 1500.0, coefficient_of_variation: 0.2 };
-    let mut newton = Newton::new(space, data, SETTINGS);
+    let mut newton = Newton::new(space, data.into(), SETTINGS);
     let (mut foreseen, mut asked) = (Vec::<Vec<f64>>::new(), 0);
     while let Proposal::Evaluate(pending) = newton.ask() {
         let pending = pending.to_vec();
@@ -456,7 +460,7 @@ fn the_points_that_measure_slopes_are_foreseen() {
         assert_eq!(newton, before, "finding candidates changes nothing");
         assert!(newton.candidates(2).len() <= 2);
         let moments = bone(&space.point(&pending));
-        newton.tell(statistics::cost(data, moments), Some(moments));
+        newton.tell(statistics::cost(data, moments), Some(moments.into()));
     }
     assert!(asked >= 6, "{asked} points were foreseen");
 }

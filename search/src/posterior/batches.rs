@@ -1,18 +1,20 @@
 //! The points at which a posterior evaluates the model, batch by batch.
 
-use osteon_common::data_likelihood::DataLikelihood;
 use osteon_common::job::JobSpecification;
+use osteon_common::moments::{ComparedMoments, MomentVector};
+use osteon_common::observables::ObservableSet;
 use osteon_common::parameters::Point;
-use osteon_common::results::Moments;
 
 use super::check::{BatchCheck, Doubt};
 use super::features::features;
+use super::likelihood::SetLikelihood;
 use super::population::{Member, Population, PosteriorProblem, closed_form};
 use super::surrogate::{Scale, Surrogate};
-use crate::newton::logarithms;
 
 /// Sobol' points of the populations from which points to evaluate are drawn.
 const SCOUTS: u64 = 2048;
+/// Effective draws of such a population that are enough.
+const USEFUL: f64 = 2.0 * BATCH as f64;
 /// Draws of each batch that check the interpolation.
 const BATCH: usize = 32;
 /// Further points of each batch, where draws matter that the interpolation knows least.
@@ -66,12 +68,11 @@ struct Pending {
 /// The reason for evaluating a point.
 #[derive(Debug, Clone, Copy)]
 enum PointUse {
-    /// It is a draw of the posterior, and checks the interpolation; with the interpolated logarithms of
-    /// its moments.
-    Check([f64; 2]),
-    /// The interpolation is uncertain there; with the interpolated logarithms of its moments, and the
-    /// expected square error in units of the data's noise.
-    Learn([f64; 2], f64),
+    /// It is a draw of the posterior, and checks the interpolation; with its interpolated moments.
+    Check(MomentVector),
+    /// The interpolation is uncertain there; with its interpolated moments, and the expected
+    /// square error in units of the data's noise.
+    Learn(MomentVector, f64),
     /// It is a draw of the prior.
     Explore,
 }
@@ -81,17 +82,20 @@ impl PosteriorSearch {
     /// data have none. `known` are points of the model that have been evaluated already.
     pub(crate) fn new(
         specification: &JobSpecification,
-        likelihood: Option<DataLikelihood>,
-        known: impl Iterator<Item = (Point, Moments)>,
+        likelihood: Option<SetLikelihood>,
+        known: impl Iterator<Item = (Point, ComparedMoments)>,
     ) -> Self {
         let settings = specification.posterior.unwrap_or_default();
         let problem =
             likelihood.and_then(|likelihood| PosteriorProblem::new(specification, likelihood));
-        let scale = problem.as_ref().map_or_else(|| Scale::from_sample(&[]), |one| one.scale);
+        let (scale, observables) = match &problem {
+            Some(problem) => (problem.scale, problem.likelihood.observables()),
+            None => (Scale::from_sample(&[]), ObservableSet::NONE),
+        };
         let mut search = Self {
             problem,
             max_evaluations: settings.max_evaluations,
-            surrogate: Surrogate::new(scale),
+            surrogate: Surrogate::new(scale, observables),
             chosen_with: 0,
             pending: Vec::new(),
             evaluations: 0,
@@ -100,7 +104,7 @@ impl PosteriorSearch {
             nothing_matches: false,
             check: BatchCheck::default(),
         };
-        known.for_each(|(point, moments)| search.learn(&point, moments));
+        known.for_each(|(point, moments)| search.learn(&point, &moments));
         search.next_batch();
         search
     }
@@ -117,23 +121,24 @@ impl PosteriorSearch {
     }
 
     /// Takes the moments of the pending point; `None` if it is infeasible.
-    pub(crate) fn tell(&mut self, moments: Option<Moments>) {
+    pub(crate) fn tell(&mut self, moments: Option<ComparedMoments>) {
         let (Some(pending), Some(problem)) = (self.pending.pop(), &self.problem) else { return };
         self.evaluations += 1;
-        let logs = moments.map(logarithms);
-        match (pending.used_for, logs) {
-            (PointUse::Check(interpolated), logs) => {
-                let exact = logs.map_or(f64::NEG_INFINITY, |logs| problem.likelihood.log(logs));
-                self.check.add(exact - problem.likelihood.log(interpolated));
+        let values = moments.map(|moments| moments.in_logarithms(&problem.likelihood.data));
+        match (pending.used_for, values) {
+            (PointUse::Check(interpolated), values) => {
+                let exact = values.map_or(f64::NEG_INFINITY, |at| problem.likelihood.log(&at));
+                self.check.add(exact - problem.likelihood.log(&interpolated));
             }
-            (PointUse::Learn(interpolated, expected), Some(logs)) => {
-                let errors = [0, 1].map(|k| logs[k] - interpolated[k]);
-                self.check.learn(problem.in_noise(errors.map(|error| error * error)) / expected);
+            (PointUse::Learn(interpolated, expected), Some(values)) => {
+                let errors = values.iter().zip(interpolated).map(|(exact, one)| exact - one);
+                let squares = errors.map(|error| error * error);
+                self.check.learn(problem.in_noise(squares) / expected);
             }
             (PointUse::Learn(..), None) | (PointUse::Explore, _) => {}
         }
         if let Some(moments) = moments {
-            self.learn(&pending.point, moments);
+            self.learn(&pending.point, &moments);
         }
         if self.pending.is_empty() {
             self.next_batch();
@@ -154,11 +159,12 @@ impl PosteriorSearch {
         }
     }
 
-    fn learn(&mut self, point: &Point, moments: Moments) {
-        let logs = logarithms(moments);
-        let deviations =
-            closed_form(point).map(|closed| [logs[0] - closed[0], logs[1] - closed[1]]);
-        if let (Some(at), Some(deviations)) = (features(point), deviations)
+    fn learn(&mut self, point: &Point, moments: &ComparedMoments) {
+        let Some(problem) = &self.problem else { return };
+        let mut deviations = moments.in_logarithms(&problem.likelihood.data);
+        let Some(closed) = closed_form(point) else { return };
+        deviations.iter_mut().zip(closed).for_each(|(one, closed)| *one -= closed);
+        if let Some(at) = features(point)
             && deviations.iter().all(|deviation| deviation.is_finite())
         {
             self.surrogate.add(&at, deviations);
@@ -182,7 +188,7 @@ impl PosteriorSearch {
         if passed || left == 0 {
             return;
         }
-        let mut population = problem.population(&self.surrogate, SCOUTS, number);
+        let mut population = problem.rich_population(&self.surrogate, SCOUTS, number, USEFUL);
         self.nothing_matches = population.members.is_empty();
         if self.nothing_matches {
             let skipped = self.explored as usize * BATCH;
@@ -218,7 +224,7 @@ impl PosteriorSearch {
     fn expected_errors(&self, problem: &PosteriorProblem, population: &Population) -> Vec<f64> {
         let of = |member: &Member| {
             let variances = features(&member.point).map(|at| self.surrogate.variances(&at));
-            variances.map_or(0.0, |found| problem.in_noise(found).min(ERROR_LIMIT))
+            variances.map_or(0.0, |found| problem.in_noise(found.into_iter()).min(ERROR_LIMIT))
         };
         population.members.iter().map(of).collect()
     }

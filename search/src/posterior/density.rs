@@ -1,36 +1,33 @@
 //! The density of the posterior at a point whose moments are known, for programs that sample it
 //! themselves.
 
-use osteon_common::data_likelihood::DataLikelihood;
 use osteon_common::job::JobSpecification;
-use osteon_common::moments::Moments;
+use osteon_common::moments::{ComparedMoments, MomentVector};
 use osteon_common::parameters::Point;
 
-use super::likelihood;
+use super::likelihood::SetLikelihood;
 use super::prior::ParameterPrior;
 
 /// Likelihood of one set of data and priors of the free parameters.
 #[derive(Debug, Clone)]
 pub struct PosteriorDensity {
-    likelihood: DataLikelihood,
+    likelihood: SetLikelihood,
     priors: Vec<ParameterPrior>,
 }
 
 impl PosteriorDensity {
-    /// Creates the density for set number `set` of the data; `None` if there are no data, if their
-    /// noise is unknown, or if they have decays, which have no likelihood.
+    /// Creates the density for set number `set` of the data; `None` if there are no data, or if their
+    /// noise is unknown.
     pub fn new(specification: &JobSpecification, set: usize) -> Option<Self> {
-        if specification.has_decays() {
-            return None;
-        }
-        let likelihood = likelihood(specification, set)?;
+        let likelihood = SetLikelihood::new(specification, set)?;
         Some(Self { likelihood, priors: ParameterPrior::of_job(specification) })
     }
 
-    /// Averages the likelihood over the sampling errors of the model's moments, given as relative
+    /// Averages the likelihood over the sampling errors of the moments of the model's velocities, given as relative
     /// standard errors, which common germs make nearly the same at every point.
     #[must_use]
-    pub fn with_model_errors(self, errors: [f64; 2]) -> Self {
+    pub fn with_model_errors(self, [mean, variation]: [f64; 2]) -> Self {
+        let errors: MomentVector = [mean, variation, 0.0, 0.0, 0.0];
         Self { likelihood: self.likelihood.with_model_errors(errors), ..self }
     }
 
@@ -41,9 +38,9 @@ impl PosteriorDensity {
 
     /// Returns the logarithm of likelihood times prior, nats, up to a constant, given the moments of
     /// the model at the point; `None` outside the bounds, and where it is not finite.
-    pub fn log_density(&self, point: &Point, moments: Moments) -> Option<f64> {
-        let logarithms = [moments.mean, moments.coefficient_of_variation].map(libm::log);
-        let density = self.log_prior(point)? + self.likelihood.log(logarithms);
+    pub fn log_density(&self, point: &Point, moments: &ComparedMoments) -> Option<f64> {
+        let values = moments.in_logarithms(&self.likelihood.data);
+        let density = self.log_prior(point)? + self.likelihood.log(&values);
         density.is_finite().then_some(density)
     }
 }
@@ -55,6 +52,8 @@ mod tests {
         Data, JobKind, Measurements, MonteCarlo, Objective, PosteriorPrior, PosteriorSettings,
         Range, Search,
     };
+    use osteon_common::moments::Moments;
+    use osteon_common::observables::ObservedColumns;
     use osteon_common::random_quantities::RandomQuantities;
 
     use super::*;
@@ -95,19 +94,19 @@ mod tests {
             count: Some(1000),
         };
         let density = PosteriorDensity::new(&job(data), 0).unwrap();
-        let best = density.log_density(&at(18e9), MEAN).unwrap();
+        let best = density.log_density(&at(18e9), &MEAN.into()).unwrap();
         // The mean is off by two of its standard errors.
         let off = Moments { mean: 3900.0 * (1.0 + 2.0 * 0.03 / 1000f64.sqrt()), ..MEAN };
         let off = Moments { coefficient_of_variation: 117.0 / off.mean, ..off };
-        let lower = density.log_density(&at(18e9), off).unwrap();
+        let lower = density.log_density(&at(18e9), &off.into()).unwrap();
         assert!((best - lower - 2.0).abs() < 0.01, "{best} {lower}");
-        let prior = density.log_density(&at(20e9), MEAN).unwrap();
+        let prior = density.log_density(&at(20e9), &MEAN.into()).unwrap();
         assert!((best - prior - 2.0).abs() < 1e-9, "{best} {prior}");
         // Errors of the model as large as those of the data halve what a misfit costs.
         let error = 0.03 / 1000f64.sqrt();
         let blurred = density.with_model_errors([error, 0.03 / 2000f64.sqrt()]);
-        let cost = blurred.log_density(&at(18e9), MEAN).unwrap()
-            - blurred.log_density(&at(18e9), off).unwrap();
+        let cost = blurred.log_density(&at(18e9), &MEAN.into()).unwrap()
+            - blurred.log_density(&at(18e9), &off.into()).unwrap();
         assert!((cost - 1.0).abs() < 0.1, "{cost}");
     }
 
@@ -118,12 +117,15 @@ mod tests {
         data.measurements = Measurements::Velocities {
             velocities: velocities.to_vec(),
             subjects: None,
-            decays: None,
+            observables: ObservedColumns::default(),
         };
         let density = PosteriorDensity::new(&job(data), 0).unwrap();
-        assert!(density.log_density(&at(12e9), MEAN).is_some());
-        assert_eq!(density.log_density(&at(11.99e9), MEAN), None);
-        assert_eq!(density.log_density(&at(18e9), Moments { mean: f64::NAN, ..MEAN }), None);
+        assert!(density.log_density(&at(12e9), &MEAN.into()).is_some());
+        assert_eq!(density.log_density(&at(11.99e9), &MEAN.into()), None);
+        assert_eq!(
+            density.log_density(&at(18e9), &Moments { mean: f64::NAN, ..MEAN }.into()),
+            None
+        );
     }
 
     #[test]

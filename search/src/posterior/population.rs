@@ -5,17 +5,18 @@
 //! is posterior density over density of its draw; with the pivots z it is π(z) L(y)/(q(y) |∂y/∂z|).
 
 use osteon_common::bulk_velocity::bulk_velocity;
-use osteon_common::data_likelihood::DataLikelihood;
 use osteon_common::ensemble::GERMS;
 use osteon_common::germ_source::sobol_points;
 use osteon_common::job::JobSpecification;
+use osteon_common::moments::MomentVector;
 use osteon_common::parameters::{Parameter, Point};
 
 use super::features::{Features, features};
+use super::likelihood::SetLikelihood;
 use super::moments_grid::{LogSpan, MomentsGrid};
 use super::pivot::{Pivots, solve};
 use super::prior::ParameterPrior;
-use super::surrogate::{Deviations, RULE_OF_THUMB, Scale, Surrogate};
+use super::surrogate::{RULE_OF_THUMB, Scale, Surrogate};
 use crate::search_box::admissible;
 
 /// Number of points drawn from the prior for scales and ranges.
@@ -35,13 +36,15 @@ const OVERSHOOT: f64 = 0.1;
 /// Step of the derivatives by the pivots, relative to the bounds' distance.
 const STEP: f64 = 1e-5;
 
+/// How often a population may be drawn anew from four times as many points.
+const RICHER_MAX: u32 = 2;
 /// Power of the likelihood of widened populations.
 const WIDENED: f64 = 0.5;
 
 /// Everything that a posterior depends on except for the model.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PosteriorProblem {
-    pub(super) likelihood: DataLikelihood,
+    pub(super) likelihood: SetLikelihood,
     pub(super) priors: Vec<ParameterPrior>,
     pub(super) scale: Scale,
     /// Values of the fixed parameters, and medians of the others.
@@ -57,8 +60,8 @@ pub(super) struct PosteriorProblem {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Member {
     pub(super) point: Point,
-    /// Logarithms of mean velocity and coefficient of variation by the interpolation.
-    pub(super) moments: [f64; 2],
+    /// Compared moments by the interpolation, in logarithms.
+    pub(super) moments: MomentVector,
     /// Logarithm of the weight, with any common factor.
     pub(super) log_weight: f64,
 }
@@ -74,10 +77,7 @@ pub(super) struct Population {
 impl PosteriorProblem {
     /// Creates the problem of a job with this likelihood of its data; `None` if no point within the
     /// bounds is admissible, or no parameter is free.
-    pub(super) fn new(
-        specification: &JobSpecification,
-        likelihood: DataLikelihood,
-    ) -> Option<Self> {
+    pub(super) fn new(specification: &JobSpecification, likelihood: SetLikelihood) -> Option<Self> {
         let priors = ParameterPrior::of_job(specification);
         let mut base = specification.start();
         for prior in &priors {
@@ -95,16 +95,16 @@ impl PosteriorProblem {
             [low + REACH[k][0], high + REACH[k][1]]
         };
         let reach = [reach(0, |one| 0.5 * one[5]), reach(1, |one| one[6])];
-        let grid = MomentsGrid::new(&likelihood, reach);
+        let grid = MomentsGrid::new(&likelihood.velocities, reach);
         let pivots = Pivots::choose(&priors, points.first().unwrap_or(&base));
         let scale = Scale::from_sample(&sample);
         Some(Self { likelihood, priors, scale, base, pivots, reach, grid, seed })
     }
 
     /// Returns the problem with a model whose moments have these relative standard errors.
-    pub(super) fn with_model_errors(&self, errors: [f64; 2]) -> Self {
+    pub(super) fn with_model_errors(&self, errors: MomentVector) -> Self {
         let likelihood = self.likelihood.clone().with_model_errors(errors);
-        let grid = MomentsGrid::new(&likelihood, self.reach);
+        let grid = MomentsGrid::new(&likelihood.velocities, self.reach);
         Self { likelihood, grid, ..self.clone() }
     }
 
@@ -124,10 +124,32 @@ impl PosteriorProblem {
         Population::new(members.collect())
     }
 
-    /// Returns the sum of square errors of ln v and ln Δ, in units of the data's noise.
-    pub(super) fn in_noise(&self, squares: [f64; 2]) -> f64 {
-        let noise = self.likelihood.errors();
-        squares[0] / (noise[0] * noise[0]) + squares[1] / (noise[1] * noise[1])
+    /// Draws a population as above, from four times as many points as long as fewer than `useful` draws
+    /// of it count: points match the velocities by their pivots, but other observables only by chance.
+    pub(super) fn rich_population(
+        &self,
+        model: &Surrogate,
+        count: u64,
+        number: u64,
+        useful: f64,
+    ) -> Population {
+        let mut population = self.population(model, count, number);
+        if self.likelihood.observables().is_empty() || self.is_of_few() {
+            return population;
+        }
+        for richer in 1..=RICHER_MAX {
+            if population.effective() >= useful {
+                break;
+            }
+            population = self.population(model, count << (2 * richer), number);
+        }
+        population
+    }
+
+    /// Returns the sum of square errors of the compared moments, in units of the data's noise.
+    pub(super) fn in_noise(&self, squares: impl Iterator<Item = f64>) -> f64 {
+        let terms = squares.zip(self.likelihood.errors());
+        terms.map(|(square, error)| square / (error * error)).sum()
     }
 
     /// Returns whether there are at most two free parameters: the result is then exact to 1e-3 of a
@@ -140,7 +162,7 @@ impl PosteriorProblem {
     /// errors in the tails, which the ends of intervals depend on.
     pub(super) fn widened(&self, population: Population) -> Population {
         let wider = |member: Member| {
-            let log_likelihood = self.likelihood.log(member.moments);
+            let log_likelihood = self.likelihood.log(&member.moments);
             let log_weight = member.log_weight - (1.0 - WIDENED) * log_likelihood;
             Member { log_weight, ..member }
         };
@@ -164,9 +186,9 @@ impl PosteriorProblem {
             return None;
         }
         let moments = moments(model, &point)?;
-        let jacobian = self.jacobian(model, &point, moments)?;
+        let jacobian = self.jacobian(model, &point, [moments[0], moments[1]])?;
         let log_weight =
-            log_prior + self.likelihood.log(moments) - draw.log_density - libm::log(jacobian);
+            log_prior + self.likelihood.log(&moments) - draw.log_density - libm::log(jacobian);
         log_weight.is_finite().then_some(Member { point, moments, log_weight })
     }
 
@@ -179,8 +201,8 @@ impl PosteriorProblem {
         wanted: [f64; 2],
         branch: usize,
     ) -> Option<Point> {
-        let first = features(&point).map(|at| model.mean(&at));
-        let mut deviations: Deviations = first.unwrap_or(RULE_OF_THUMB);
+        let first = features(&point).map(|at| model.mean_of_velocities(&at));
+        let mut deviations = first.unwrap_or([RULE_OF_THUMB[0], RULE_OF_THUMB[1]]);
         for _ in 0..CORRECTIONS_MAX {
             if self.pivots.dispersion {
                 let dispersion = libm::exp(wanted[1] - deviations[1]);
@@ -190,7 +212,7 @@ impl PosteriorProblem {
                 let value = solve(&point, pivot, wanted[0] - deviations[0], branch)?;
                 self.set(&mut point, pivot, value)?;
             }
-            let found = model.mean(&features(&point)?);
+            let found = model.mean_of_velocities(&features(&point)?);
             let change = (found[0] - deviations[0]).abs().max((found[1] - deviations[1]).abs());
             deviations = found;
             if change <= CORRECTED {
@@ -226,7 +248,7 @@ impl PosteriorProblem {
             let step = STEP * (prior.upper - prior.lower);
             let mut beside = *point;
             beside.0[parameter as usize] -= step;
-            let found = moments(model, &beside)?;
+            let found = moments_of_velocities(model, &beside)?;
             Some([0, 1].map(|k| (at[k] - found[k]) / step))
         };
         let determinant = match (self.pivots.mean, self.pivots.dispersion) {
@@ -310,10 +332,18 @@ pub(super) fn normalised(logs: &[f64]) -> Vec<f64> {
     weights
 }
 
+/// Returns the compared moments of an interpolated model at a point, in logarithms.
+pub(super) fn moments(model: &Surrogate, point: &Point) -> Option<MomentVector> {
+    let mut found = model.mean(&features(point)?);
+    found.iter_mut().zip(closed_form(point)?).for_each(|(one, closed)| *one += closed);
+    Some(found)
+}
+
 /// Returns ln v and ln Δ of an interpolated model at a point.
-pub(super) fn moments(model: &Surrogate, point: &Point) -> Option<[f64; 2]> {
-    let [mean, variation] = model.mean(&features(point)?);
-    Some([closed_form(point)?[0] + mean, closed_form(point)?[1] + variation])
+fn moments_of_velocities(model: &Surrogate, point: &Point) -> Option<[f64; 2]> {
+    let [mean, variation] = model.mean_of_velocities(&features(point)?);
+    let closed = closed_form(point)?;
+    Some([closed[0] + mean, closed[1] + variation])
 }
 
 /// Returns ln √(c1111/ρ) and ln δ at a point.

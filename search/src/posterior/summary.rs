@@ -3,6 +3,7 @@
 use osteon_common::data_likelihood::MODEL_ERROR_MAX;
 use osteon_common::data_statistics::{FittedMoments, predictive_test};
 use osteon_common::job::JobSpecification;
+use osteon_common::moments::MomentVector;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
 use osteon_common::results::{BestPoint, Moments};
@@ -25,7 +26,7 @@ impl PosteriorSearch {
     pub(crate) fn result(
         &self,
         specification: &JobSpecification,
-        errors: [f64; 2],
+        errors: MomentVector,
     ) -> Option<Posterior> {
         let problem = self.problem.as_ref().filter(|_| self.point().is_none())?;
         let problem = &problem.with_model_errors(errors);
@@ -35,7 +36,7 @@ impl PosteriorSearch {
         }
         let effective = population.effective() * self.check.efficiency();
         let reason = self.reason(errors);
-        let [of_mean, of_variation] = in_units_of_the_data(problem, errors);
+        let of_sampling = in_units_of_the_data(problem, errors).into_iter().map(|one| one * one);
         let prior = problem.prior_points(PRIOR_POINTS);
         let of = |quantity: &dyn Fn(&Point) -> f64| summary(&population, &prior, quantity);
         let free: Vec<Parameter> = problem.priors.iter().map(|prior| prior.parameter).collect();
@@ -53,7 +54,7 @@ impl PosteriorSearch {
             model_error: self.check.error(),
             check_efficiency: self.check.efficiency(),
             pareto_k: self.check.pareto_shape(),
-            sampling_error: libm::hypot(of_mean, of_variation),
+            sampling_error: of_sampling.sum::<f64>().sqrt(),
             parameters: free.iter().map(|&one| of(&|point| point.get(one))).collect(),
             correlation: correlation(&population, &free),
             free,
@@ -64,13 +65,13 @@ impl PosteriorSearch {
             }),
             entries: entries(&population, &prior),
             predictive_p_value: None,
-            outlier_share: problem.likelihood.outlier_share(at).map(|share| share.mean),
+            outlier_share: problem.likelihood.velocities.outlier_share(at).map(|share| share.mean),
             draws: draws(&population, problem, count),
         })
     }
 
     /// Returns how a job ends that asks for nothing but the posterior; `errors` as in `result`.
-    pub(crate) fn ending(&self, errors: Option<[f64; 2]>) -> SearchOutcome {
+    pub(crate) fn ending(&self, errors: Option<MomentVector>) -> SearchOutcome {
         match (self.outcome(), errors) {
             (SearchOutcome::Converged, Some(errors)) => {
                 self.reason(errors).map_or(SearchOutcome::Converged, SearchOutcome::Doubtful)
@@ -85,7 +86,7 @@ impl PosteriorSearch {
     }
 
     /// Returns why the result is not accurate; `None` if it is.
-    fn reason(&self, errors: [f64; 2]) -> Option<String> {
+    fn reason(&self, errors: MomentVector) -> Option<String> {
         if let SearchOutcome::Doubtful(reason) = self.outcome() {
             return Some(reason);
         }
@@ -108,21 +109,20 @@ impl PosteriorSearch {
     /// Returns the draws of the final interpolation.
     fn final_population(&self, problem: &PosteriorProblem) -> Population {
         let points = POINTS[usize::from(!problem.is_of_few())];
-        problem.population(&self.surrogate, points, self.populations)
+        problem.rich_population(&self.surrogate, points, self.populations, 2.0 * EFFECTIVE_MIN)
     }
 }
 
 /// Returns the relative errors of the model's moments in units of the data's.
-fn in_units_of_the_data(problem: &PosteriorProblem, errors: [f64; 2]) -> [f64; 2] {
+fn in_units_of_the_data(problem: &PosteriorProblem, errors: MomentVector) -> MomentVector {
     let noise = problem.likelihood.errors();
-    [0, 1].map(|k| errors[k] / noise[k])
+    std::array::from_fn(|k| errors[k] / noise[k])
 }
 
 /// Returns why a model with these relative errors of its moments has no accurate posterior; `None` if
 /// it may have one.
-fn too_noisy(problem: &PosteriorProblem, errors: [f64; 2]) -> Option<String> {
-    let [mean, variation] = in_units_of_the_data(problem, errors);
-    let largest = mean.max(variation);
+fn too_noisy(problem: &PosteriorProblem, errors: MomentVector) -> Option<String> {
+    let largest = in_units_of_the_data(problem, errors).into_iter().fold(0.0, f64::max);
     (largest > MODEL_ERROR_MAX).then(|| {
         format!(
             "the sampling errors of the model's moments are {largest:.0} times those of the data, \
@@ -240,7 +240,7 @@ fn draws(population: &Population, problem: &PosteriorProblem, count: usize) -> V
         });
         PosteriorDraw {
             point: member.point,
-            log_density: problem.likelihood.log(member.moments) + log_prior.sum::<f64>(),
+            log_density: problem.likelihood.log(&member.moments) + log_prior.sum::<f64>(),
             mean: libm::exp(member.moments[0]),
             coefficient_of_variation: libm::exp(member.moments[1]),
         }

@@ -1,20 +1,24 @@
 //! Interpolation of the model's moments: Gaussian processes for their deviation from the closed
 //! form.
 //!
-//! Each of ln v - ln √(c1111/ρ) and ln Δ - ln δ is interpolated by a Gaussian process in the features
+//! Each of ln v - ln √(c1111/ρ), ln Δ - ln δ and the means of other observables is interpolated by a Gaussian process in the features
 //! of the point (C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning
 //! (2006), Sec. 2.2 and 5.4), with a Matérn kernel of order 5/2, a broad linear trend and a length
 //! for each feature, chosen by maximum marginal likelihood.
 
+use osteon_common::moments::{MOMENTS, MomentVector};
+use osteon_common::observables::ObservableSet;
+
 use super::cholesky::{Cholesky, dot};
 use super::features::{FEATURES, Features};
 
-/// The two deviations at a point: of ln v and of ln Δ.
-pub(super) type Deviations = [f64; 2];
+/// The deviations at a point: of ln v, of ln Δ, and of each observable that of its mean from the data's,
+/// relative to that; 0 for one that was not measured.
+pub(super) type Deviations = MomentVector;
 
 /// Deviations by the rule of thumb, for use before any evaluation: v = 0.99 √(c1111/ρ),
 /// Δ = 0.99 δ/√14.
-pub(super) const RULE_OF_THUMB: Deviations = [-0.010_05, -1.329_58];
+pub(super) const RULE_OF_THUMB: Deviations = [-0.010_05, -1.329_58, 0.0, 0.0, 0.0];
 
 /// Variance of constant and trend in units of the process's own: practically unknown beforehand.
 const TREND_VARIANCE: f64 = 100.0;
@@ -41,7 +45,9 @@ pub(super) struct Surrogate {
     scale: Scale,
     inputs: Vec<Features>,
     outputs: Vec<Deviations>,
-    processes: [Process; 2],
+    processes: [Process; MOMENTS],
+    /// Whether each deviation is interpolated: not those of observables that were not measured.
+    interpolated: [bool; MOMENTS],
 }
 
 /// Centre and spread of each feature; the spread is infinite where a feature does not vary.
@@ -89,9 +95,11 @@ impl Scale {
 
 impl Surrogate {
     /// Creates an interpolation without points, which predicts the rule of thumb.
-    pub(super) fn new(scale: Scale) -> Self {
+    pub(super) fn new(scale: Scale, observables: ObservableSet) -> Self {
         let processes = RULE_OF_THUMB.map(Process::new);
-        Self { scale, inputs: Vec::new(), outputs: Vec::new(), processes }
+        let mut interpolated = [true; MOMENTS];
+        interpolated[2..].copy_from_slice(&observables.0);
+        Self { scale, inputs: Vec::new(), outputs: Vec::new(), processes, interpolated }
     }
 
     /// Returns the number of points.
@@ -107,7 +115,9 @@ impl Surrogate {
 
     /// Uses all points added; chooses the lengths anew if asked to.
     pub(super) fn fit(&mut self, choose_lengths: bool) {
-        for (k, process) in self.processes.iter_mut().enumerate() {
+        let interpolated = self.interpolated;
+        let processes = self.processes.iter_mut().enumerate();
+        for (k, process) in processes.filter(|(k, _)| interpolated[*k]) {
             let values: Vec<f64> = self.outputs.iter().map(|output| output[k]).collect();
             if choose_lengths {
                 let from = values.len().saturating_sub(POINTS_FOR_LENGTHS_MAX);
@@ -120,13 +130,23 @@ impl Surrogate {
     /// Predicts the deviations at a point.
     pub(super) fn mean(&self, features: &Features) -> Deviations {
         let at = self.scale.apply(features);
+        self.of_each(|process| process.mean(&self.inputs, &at))
+    }
+
+    /// Predicts the deviations of ln v and ln Δ alone.
+    pub(super) fn mean_of_velocities(&self, features: &Features) -> [f64; 2] {
+        let at = self.scale.apply(features);
         [0, 1].map(|k| self.processes[k].mean(&self.inputs, &at))
+    }
+
+    fn of_each(&self, value: impl Fn(&Process) -> f64) -> Deviations {
+        std::array::from_fn(|k| if self.interpolated[k] { value(&self.processes[k]) } else { 0.0 })
     }
 
     /// Returns the variances of the prediction at a point, as the processes expect them.
     pub(super) fn variances(&self, features: &Features) -> Deviations {
         let at = self.scale.apply(features);
-        [0, 1].map(|k| self.processes[k].variance_at(&self.inputs, &at))
+        self.of_each(|process| process.variance_at(&self.inputs, &at))
     }
 }
 
@@ -237,6 +257,7 @@ impl Process {
 #[cfg(test)]
 mod tests {
     use osteon_common::ensemble::Germs;
+    use osteon_common::observables::PerObservable;
 
     use super::*;
 
@@ -244,15 +265,19 @@ mod tests {
         (0..count).map(|i| std::array::from_fn(|k| Germs::draw(seed, i).values()[k])).collect()
     }
 
+    const WITH_DECAY: ObservableSet = PerObservable([false, true, false]);
+
     /// A smooth function of two features.
     fn deviations(x: &Features) -> Deviations {
-        [0.01 * libm::sin(2.0 * x[0]) * (1.0 + x[1]), -1.33 + 0.02 * x[1] * x[1] + 0.1 * x[0]]
+        let variation = -1.33 + 0.02 * x[1] * x[1] + 0.1 * x[0];
+        let decay = 0.02 * libm::sin(x[0] + x[1]);
+        [0.01 * libm::sin(2.0 * x[0]) * (1.0 + x[1]), variation, 0.0, decay, 0.0]
     }
 
     #[test]
     fn smooth_functions_are_interpolated() {
         let inputs = sample(80, 3);
-        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs));
+        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs), WITH_DECAY);
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);
         for x in sample(50, 4) {
@@ -266,10 +291,10 @@ mod tests {
     #[test]
     fn expected_errors_are_those_found() {
         let inputs = sample(60, 3);
-        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs));
+        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs), WITH_DECAY);
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);
-        let mut sums = [[0.0; 2]; 2];
+        let mut sums = [[0.0; 2]; MOMENTS];
         for x in sample(200, 4) {
             let (found, expected) = (surrogate.mean(&x), deviations(&x));
             for (k, variance) in surrogate.variances(&x).into_iter().enumerate() {
@@ -277,7 +302,7 @@ mod tests {
                 sums[k][1] += variance;
             }
         }
-        for [found, expected] in sums {
+        for [found, expected] in [sums[0], sums[1], sums[3]] {
             let ratio = (found / expected).sqrt();
             assert!((0.33..3.0).contains(&ratio), "{ratio}");
         }
@@ -288,7 +313,7 @@ mod tests {
     #[test]
     fn points_are_interpolated() {
         let inputs = sample(30, 5);
-        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs));
+        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs), WITH_DECAY);
         assert_eq!(surrogate.mean(&inputs[0]), RULE_OF_THUMB);
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);

@@ -8,6 +8,7 @@ use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorPrior, PosteriorSettings,
     Range, Search,
 };
+use osteon_common::moments::MOMENTS;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorSummary};
 use osteon_common::random_quantities::RandomQuantities;
@@ -16,7 +17,7 @@ use osteon_common::special::standard_normal_quantile;
 
 use super::features::features;
 use super::population::closed_form;
-use super::{PosteriorSearch, SearchOutcome, likelihood};
+use super::{PosteriorSearch, SearchOutcome, SetLikelihood};
 
 const OPTIMUM: Point =
     Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029]);
@@ -93,12 +94,12 @@ fn posterior(specification: &JobSpecification) -> Posterior {
 }
 
 fn posterior_of(specification: &JobSpecification, model: Model) -> Posterior {
-    let likelihood = likelihood(specification, 0);
+    let likelihood = SetLikelihood::new(specification, 0);
     let mut search = PosteriorSearch::new(specification, likelihood, std::iter::empty());
     while let Some(point) = search.point() {
-        search.tell(model(&point));
+        search.tell(model(&point).map(Into::into));
     }
-    search.result(specification, [0.0; 2]).unwrap()
+    search.result(specification, [0.0; MOMENTS]).unwrap()
 }
 
 fn log_density(likelihood: &DataLikelihood, point: &Point) -> f64 {
@@ -147,7 +148,7 @@ fn one_parameter_has_the_posterior_of_quadrature() {
         let specification = specification(&[parameter], 300, PosteriorSettings::default());
         let found = posterior(&specification);
         assert!(found.converged, "{:?}", found.reason);
-        let likelihood = likelihood(&specification, 0).unwrap();
+        let likelihood = SetLikelihood::new(&specification, 0).unwrap().velocities;
         let [lower, upper] = BOUNDS[parameter as usize];
         let nodes = 400_000;
         let values = (0..nodes).map(|k| {
@@ -167,7 +168,7 @@ fn two_parameters_have_the_posterior_of_quadrature() {
     let specification = specification(&free, 300, PosteriorSettings::default());
     let found = posterior(&specification);
     assert!(found.converged, "{:?}", found.reason);
-    let likelihood = likelihood(&specification, 0).unwrap();
+    let likelihood = SetLikelihood::new(&specification, 0).unwrap().velocities;
     // The posterior is negligible outside these ranges.
     let ranges = [[16.9e9, 18.5e9], [0.078, 0.135]];
     let nodes = 1500;
@@ -227,7 +228,7 @@ fn narrow_bounds_have_the_posterior_of_many_points_of_the_prior() {
 fn check_with_points_of_the_prior(specification: &JobSpecification, model: Model) {
     let found = posterior_of(specification, model);
     assert!(found.converged, "{:?}", found.reason);
-    let likelihood = likelihood(specification, 0).unwrap();
+    let likelihood = SetLikelihood::new(specification, 0).unwrap().velocities;
     let points = sobol_points(77, 0, 1 << 18);
     let weighted: Vec<(Point, f64)> = points
         .iter()
@@ -260,7 +261,7 @@ fn narrow_normal_priors_give_the_gaussian_formula() {
     let specification = specification(&Parameter::OF_BONE, 2747, settings);
     let found = posterior(&specification);
     assert!(found.converged, "{:?}", found.reason);
-    let noise = likelihood(&specification, 0).unwrap().errors();
+    let noise = SetLikelihood::new(&specification, 0).unwrap().velocities.errors();
     // The dispersion alone follows the variation; the others share the mean velocity.
     let gradient: Vec<f64> = (0..6)
         .map(|k| {
@@ -340,9 +341,9 @@ fn a_wrong_velocity_hardly_moves_the_posterior() {
 fn a_posterior_of_too_noisy_a_model_has_not_converged() {
     let free = [Parameter::Density, Parameter::TransversePoissonRatio, Parameter::Dispersion];
     let job = specification(&free, 100, PosteriorSettings::default());
-    let mut search = PosteriorSearch::new(&job, likelihood(&job, 0), std::iter::empty());
+    let mut search = PosteriorSearch::new(&job, SetLikelihood::new(&job, 0), std::iter::empty());
     while let Some(point) = search.point() {
-        search.tell(model(&point));
+        search.tell(model(&point).map(Into::into));
     }
     let noise = search.problem.as_ref().unwrap().likelihood.errors();
     for (ratio, converged) in [(1.0, true), (9.0, false)] {

@@ -8,6 +8,7 @@
 use std::sync::Arc;
 
 use osteon_common::job::{Data, JobSpecification};
+use osteon_common::observables::ObservableSet;
 use osteon_common::outcome::FailureCounts;
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
@@ -95,9 +96,9 @@ impl Branch {
         self.search.point()
     }
 
-    /// Returns whether the decay of each realization is needed.
-    pub fn has_decays(&self) -> bool {
-        self.specification.has_decays()
+    /// Returns the observables that are needed of each realization.
+    pub fn observables(&self) -> ObservableSet {
+        self.specification.observables()
     }
 
     /// Takes the outcomes, in index order, of the pending point, and what another part has computed from
@@ -117,7 +118,7 @@ impl Branch {
             role: EvaluationRole::default(),
             point,
             moments: statistics.moments,
-            decay: statistics.decay,
+            observables: statistics.observables,
             cost: Some(cost),
             failures: FailureCounts::from_outcomes(outcomes),
             estimated_error: None,

@@ -2,17 +2,18 @@
 //! point.
 
 use osteon_common::ensemble::Germs;
-use osteon_common::inference::{DecayWeights, MomentWeights, agreement};
-use osteon_common::job::{JobSpecification, NoVariation, Objective, Range};
+use osteon_common::inference::{MomentWeights, agreement, model_errors};
+use osteon_common::job::{JobSpecification, MonteCarlo, NoVariation, Objective, Range};
+use osteon_common::observables::ObservableMeans;
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::results::{Evaluation, EvaluationRole, GroupEnding, Moments, Status};
-use osteon_common::statistics::{PointStatistics, decay_estimate, estimate, likelihood_cost};
+use osteon_common::results::{ComparedMoments, Evaluation, EvaluationRole, GroupEnding, Status};
+use osteon_common::statistics::{PointStatistics, estimate, likelihood_cost, observable_estimates};
 
 use super::ending::Ending;
 use super::method::MethodState;
 use super::reasons;
-use crate::posterior::{PosteriorSearch, feasible_moments, likelihood};
+use crate::posterior::{PosteriorSearch, SetLikelihood, feasible_moments};
 use crate::proposal::{Proposal, StopReason};
 use crate::search_box::{SearchBox, admissible};
 
@@ -29,11 +30,9 @@ const START_TRIES: u64 = 64;
 pub(super) struct DatasetSearch {
     /// Number of the set.
     set: u32,
-    data: Moments,
-    /// Weights of the moments, if the cost is χ².
+    data: ComparedMoments,
+    /// Weights of the moments, if the cost is χ², or other observables were measured.
     weights: Option<MomentWeights>,
-    /// Weights of the moments and the mean decay, if decays were measured.
-    with_decay: Option<DecayWeights>,
     /// Number of the current start.
     start: u32,
     /// The search ends with this start, without derivatives and posterior.
@@ -52,7 +51,7 @@ pub(super) struct DatasetSearch {
     /// Points that measure derivatives, in reverse order.
     differences: Vec<(Parameter, Point)>,
     /// Feasible points of the search, kept only for a posterior.
-    known: Vec<(Point, Moments)>,
+    known: Vec<(Point, ComparedMoments)>,
     /// Points of the posterior, which come last.
     posterior: Option<Box<PosteriorSearch>>,
     ending: Option<GroupEnding>,
@@ -90,11 +89,12 @@ impl DatasetSearch {
         tolerance: f64,
     ) -> Self {
         let given = specification.data.as_ref();
-        let data = given.map_or(Moments::UNKNOWN, |given| given.moments(set));
+        let data = given.map_or(ComparedMoments::UNKNOWN, |given| given.compared(set));
         let space = space_of_start(specification, set, start);
-        let weighted = given.filter(|_| specification.objective == Objective::ChiSquare);
+        let is_weighted = specification.objective == Objective::ChiSquare
+            || !specification.observables().is_empty();
+        let weighted = given.filter(|_| is_weighted);
         let weights = weighted.and_then(|given| MomentWeights::of_data(given, set));
-        let with_decay = weighted.and_then(|given| DecayWeights::of_data(given, set));
         let measured = measured(specification, set);
         let method = MethodState::new(specification, data, measured, weights, space, tolerance);
         let mut search = Self {
@@ -102,7 +102,6 @@ impl DatasetSearch {
             set: u32::try_from(set).unwrap_or(u32::MAX),
             data,
             weights,
-            with_decay,
             start,
             is_of_one_start,
             space,
@@ -171,18 +170,33 @@ impl DatasetSearch {
         outcomes: &Outcomes,
     ) -> f64 {
         let measured = measured(specification, self.set as usize);
-        if let Some(weights) = &self.with_decay {
-            let cost = |model| weights.cost(model, statistics.decay.unwrap_or(f64::NAN));
-            return statistics.cost_by(cost) + specification.penalty(point);
-        }
-        let cost = match (specification.objective, measured, self.weights) {
-            (Objective::Likelihood, Some(measured), _) => {
-                likelihood_cost(statistics, &specification.monte_carlo, point, outcomes, measured)
+        let cost = match (specification.objective, measured, &self.weights) {
+            (Objective::Likelihood, Some(measured), weights) => {
+                let velocities = (&specification.monte_carlo, point, outcomes, measured);
+                self.likelihood_cost(statistics, velocities, weights.as_ref())
             }
-            (_, _, Some(weights)) => statistics.cost_by(|model| weights.cost(self.data, model)),
-            _ => statistics.cost(self.data),
+            (Objective::ChiSquare, _, Some(weights)) => {
+                statistics.cost_by(|model| weights.cost(&self.data, model))
+            }
+            _ => statistics.cost(&self.data),
         };
         cost + specification.penalty(point)
+    }
+
+    /// Returns minus the logarithm of the likelihood of the velocities, per velocity, and of the means of
+    /// the other observables, given the moments of the velocities.
+    fn likelihood_cost(
+        &self,
+        statistics: &PointStatistics,
+        (monte_carlo, point, outcomes, measured): (&MonteCarlo, &Point, &Outcomes, &[f64]),
+        weights: Option<&MomentWeights>,
+    ) -> f64 {
+        let cost = likelihood_cost(statistics, monte_carlo, point, outcomes, measured);
+        let Some(weights) = weights else { return cost };
+        let count = measured.len() as f64;
+        cost + statistics.cost_by(|model| {
+            weights.square_given_velocities(model.differences(&self.data)) / (2.0 * count)
+        })
     }
 
     /// Takes the moments and the outcomes of the pending point, with its cost in the row. Returns
@@ -202,9 +216,11 @@ impl DatasetSearch {
             let start = self.best().map_or(0, |best| best.role.start);
             row.role = EvaluationRole { start, varied: Some(varied), ..row.role };
             row.moments = statistics.moments.filter(|_| self.fails_alike(&outcomes));
-            row.decay = statistics.decay.filter(|_| row.moments.is_some());
+            if row.moments.is_none() {
+                row.observables = ObservableMeans::default();
+            }
         } else {
-            self.method.tell(row.cost.unwrap_or(f64::INFINITY), statistics.moments);
+            self.method.tell(row.cost.unwrap_or(f64::INFINITY), statistics.compared());
             self.evaluations += 1;
             self.first.get_or_insert(row);
             self.keep_for_posterior(specification, &row);
@@ -360,7 +376,7 @@ impl DatasetSearch {
             return self.end(specification);
         }
         let set = self.set as usize;
-        let likelihood = likelihood(specification, set);
+        let likelihood = SetLikelihood::new(specification, set);
         let known = std::mem::take(&mut self.known);
         let posterior =
             PosteriorSearch::new(&specification.of_set(set), likelihood, known.into_iter());
@@ -371,12 +387,16 @@ impl DatasetSearch {
         let estimated = self.best.as_ref().and_then(|Best { row, outcomes }| {
             Some((row, estimate(&specification.monte_carlo, &row.point, outcomes)?))
         });
-        let decay = self.best_outcomes();
-        let decay = decay.and_then(|best| decay_estimate(&specification.monte_carlo, best));
+        let observables = self
+            .best_outcomes()
+            .map(|best| observable_estimates(&specification.monte_carlo, best))
+            .unwrap_or_default();
         let agreement = estimated.as_ref().and_then(|(row, estimate)| {
-            agreement(specification, self.set as usize, &row.point, estimate, decay.as_ref())
+            agreement(specification, self.set as usize, &row.point, estimate, &observables)
         });
-        let errors = estimated.as_ref().map(|(_, estimate)| estimate.relative_errors());
+        let errors = estimated
+            .as_ref()
+            .map(|(_, estimate)| model_errors(&self.data, estimate, &observables));
         let evidence = reasons::Evidence {
             best: self.best(),
             agreement,

@@ -2,7 +2,7 @@
 
 use osteon_common::inference::MomentWeights;
 use osteon_common::job::{JobSpecification, Objective, Search, SearchMethod};
-use osteon_common::results::Moments;
+use osteon_common::results::ComparedMoments;
 
 use crate::newton::{self, Newton};
 use crate::proposal::{Proposal, StopReason};
@@ -28,7 +28,7 @@ impl MethodState {
     /// of χ², if that is the cost. It ends at a cost of at most `cost_tolerance`.
     pub(super) fn new(
         specification: &JobSpecification,
-        data: Moments,
+        data: ComparedMoments,
         measured: Option<&[f64]>,
         weights: Option<MomentWeights>,
         space: SearchBox,
@@ -49,6 +49,7 @@ impl MethodState {
             SearchMethod::Newton => {
                 let settings = newton::Settings { max_evaluations, cost_tolerance, size_tolerance };
                 let newton = Newton::new(space, data, settings);
+                let weights = weights.filter(|_| specification.objective == Objective::ChiSquare);
                 Self::Newton(Box::new(match weights {
                     Some(weights) => newton.weighted_by(weights),
                     None => newton,
@@ -77,7 +78,7 @@ impl MethodState {
     }
 
     /// Takes the cost and the moments of the pending point.
-    pub(super) fn tell(&mut self, cost: f64, moments: Option<Moments>) {
+    pub(super) fn tell(&mut self, cost: f64, moments: Option<ComparedMoments>) {
         match self {
             Self::Simplex(simplex) => simplex.tell(cost),
             Self::Newton(newton) => newton.tell(cost, moments),

@@ -2,6 +2,7 @@
 
 use osteon_common::inference::Agreement;
 use osteon_common::job::{JobSpecification, Objective, Range, Search};
+use osteon_common::moments::MOMENTS;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{Evaluation, Status};
 
@@ -146,11 +147,11 @@ fn advice(specification: &JobSpecification, held_by_bounds: bool) -> String {
 }
 
 /// Returns whether the lowest cost need not match all moments: that of a likelihood, with priors, or of
-/// three moments by fewer parameters.
+/// more than two moments by fewer parameters.
 fn is_compromise(specification: &JobSpecification) -> bool {
     specification.objective == Objective::Likelihood
         || specification.has_priors()
-        || specification.has_decays()
+        || !specification.observables().is_empty()
 }
 
 /// Explains how far off the best point is after the last evaluation, unless it matches.
@@ -190,10 +191,10 @@ fn misfit(best: &Evaluation, agreement: &Agreement, specification: &JobSpecifica
     };
     let cost = match specification.objective {
         Objective::ChiSquare if specification.has_priors() => "best χ² with the priors' penalty",
-        Objective::ChiSquare if agreement.decay.is_some() => {
-            "best χ² (of at most 3 degrees of freedom)"
-        }
-        Objective::ChiSquare => "best χ² (of at most 2 degrees of freedom)",
+        Objective::ChiSquare => &format!(
+            "best χ² (of at most {} degrees of freedom)",
+            2 + agreement.observables.members().count()
+        ),
         Objective::Moments | Objective::Likelihood => "best cost",
     };
     let tolerance = match specification.objective {
@@ -201,15 +202,20 @@ fn misfit(best: &Evaluation, agreement: &Agreement, specification: &JobSpecifica
         Objective::Likelihood => String::new(),
         _ => format!(", cost_tolerance is {:?}", specification.search.cost_tolerance),
     };
-    let decay = agreement.decay.map_or_else(String::new, |[difference, error]| {
+    let observables = agreement.observables.members().map(|observable| {
+        let axis = 2 + observable as usize;
+        let difference = agreement.differences[axis];
         let side = if difference < 0.0 { "below" } else { "above" };
-        let (percent, count) =
-            (rounded(100.0 * difference.abs()), rounded(difference.abs() / error));
-        format!(", its mean decay {percent} % {side} the data's ({count} standard errors)")
+        let errors = agreement.errors.map_or_else(String::new, |errors| {
+            format!(" ({} standard errors)", rounded(difference.abs() / errors[axis]))
+        });
+        let percent = rounded(100.0 * difference.abs());
+        format!(", its mean {} {percent} % {side} the data's{errors}", observable.row().title)
     });
+    let observables: String = observables.collect();
     format!(
         "the {cost} is {:.3e}{tolerance}; the model's mean velocity is {}, its coefficient of \
-         variation {}{decay}{held}",
+         variation {}{observables}{held}",
         best.cost.unwrap_or(f64::NAN),
         off(0),
         off(1)
@@ -251,8 +257,8 @@ fn holds_back(
     agreement: &Agreement,
     specification: &JobSpecification,
 ) -> bool {
-    if specification.has_decays() {
-        // The closed form knows nothing of decays.
+    if !specification.observables().is_empty() {
+        // The closed form knows nothing of other observables.
         return true;
     }
     let step = match side {
@@ -262,7 +268,7 @@ fn holds_back(
     let mut beyond = *point;
     beyond.0[parameter as usize] += step * specification.range(parameter).edge();
     let Some((before, after)) = closed_form(point).zip(closed_form(&beyond)) else { return true };
-    let errors = agreement.errors.unwrap_or([1.0; 2]);
+    let errors = agreement.errors.unwrap_or([1.0; MOMENTS]);
     let nearer = [0, 1].map(|axis| {
         let change = after[axis] - before[axis];
         -agreement.differences[axis] * change / (errors[axis] * errors[axis])

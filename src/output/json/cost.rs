@@ -4,8 +4,8 @@ use osteon_common::job::{Data, JobKind, JobSpecification};
 use osteon_common::parameters::Parameter;
 use serde_json::{Value, json};
 
-use crate::cost::PlaceCost;
 use crate::output::ShownCost;
+use osteon_local::cost::PlaceCost;
 
 /// Returns the object; what could not be measured is null.
 pub(super) fn value(shown: &ShownCost<'_>) -> Value {

@@ -3,9 +3,9 @@
 use osteon_common::version::Program;
 use serde_json::{Map, Value, json};
 
-use crate::observations::{ObservableMoments, ObservationSummary};
 use crate::output::ShownObservations;
 use crate::program;
+use osteon_local::observations::{ObservableMoments, ObservationSummary};
 
 /// Returns the object; what no realization has is null.
 pub(super) fn value(shown: &ShownObservations<'_>) -> Value {

@@ -4,7 +4,7 @@ use osteon_search::ExpectedEvaluations;
 use osteon_solver::Isa;
 
 use super::*;
-use crate::cost::{JobCost, PlaceCost};
+use osteon_local::cost::{JobCost, PlaceCost};
 
 /// Costs of a job: milliseconds at the start, and at points of the box.
 fn cost(specification: &JobSpecification, start_ms: Option<f64>, box_ms: &[f64]) -> JobCost {

@@ -4,7 +4,7 @@ use osteon_common::outcome::FailureCounts;
 use osteon_common::settings::Extremum;
 
 use super::*;
-use crate::observations::{ObservableMoments, ObservationSummary};
+use osteon_local::observations::{ObservableMoments, ObservationSummary};
 
 fn column(count: u64, mean: f64, standard_deviation: f64, correlation: f64) -> ObservableMoments {
     ObservableMoments {

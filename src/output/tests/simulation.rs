@@ -44,15 +44,14 @@ fn simulation(
     arrival: &Result<Arrival, Failure>,
     check: Option<&Check>,
 ) -> String {
-    let (setup, signal) = (setup(Method::Hybrid), first_signal());
-    let shown = ShownSimulation {
-        setup: &setup,
-        arrival,
-        first_signal: arrival.is_ok().then_some(&signal),
-        guided_waves: &GUIDED_WAVES,
-        traces: Some(Path::new("d/traces.csv")),
-        check,
+    let solved = SolvedCase {
+        setup: setup(Method::Hybrid),
+        arrival: arrival.clone(),
+        first_signal: arrival.is_ok().then(first_signal),
+        guided_waves: GUIDED_WAVES,
+        check: check.cloned(),
     };
+    let shown = ShownSimulation { solved: &solved, traces: Some(Path::new("d/traces.csv")) };
     // Each build has its own commit.
     let commit = format!("\"commit\": {}", serde_json::json!(crate::program::COMMIT));
     printed(format, |output| output.simulation(&shown).unwrap())
@@ -81,14 +80,9 @@ fn the_sampling_that_decided_is_shown() {
     let passes = Some(PassSummary { count: 3, pairs_computed: 17_000, last });
     let arrival = Ok(Arrival { passes, ..arrival() });
     let setup = setup(Method::Exact);
-    let shown = ShownSimulation {
-        setup: &setup,
-        arrival: &arrival,
-        first_signal: None,
-        guided_waves: &GUIDED_WAVES,
-        traces: None,
-        check: None,
-    };
+    let solved =
+        SolvedCase { setup, arrival, first_signal: None, guided_waves: GUIDED_WAVES, check: None };
+    let shown = ShownSimulation { solved: &solved, traces: None };
     let text = |format| printed(format, |output| output.simulation(&shown).unwrap());
     let line = "solver exact: refinement 1, band to 12.5 MHz, period 11 µs; estimated";
     assert!(unwrapped(&text(OutputFormat::Text)).contains(line), "{}", text(OutputFormat::Text));
@@ -105,14 +99,8 @@ fn guided_waves_that_were_not_found_are_explained_and_attenuation_is_named() {
     let mut setup = setup(Method::Exact);
     setup.layers.bone_attenuation.quality_factor = Some(10.0);
     let arrival = Ok(arrival());
-    let shown = ShownSimulation {
-        setup: &setup,
-        arrival: &arrival,
-        first_signal: None,
-        guided_waves: &guided_waves,
-        traces: None,
-        check: None,
-    };
+    let solved = SolvedCase { setup, arrival, first_signal: None, guided_waves, check: None };
+    let shown = ShownSimulation { solved: &solved, traces: None };
     let text = unwrapped(&printed(OutputFormat::Text, |output| output.simulation(&shown).unwrap()));
     for part in [
         "without its attenuation, at 1 MHz",
@@ -140,14 +128,14 @@ fn an_extremum_without_velocity_is_explained() {
         ..first_signal()
     };
     let (setup, arrival) = (setup(Method::Exact), Ok(arrival()));
-    let shown = ShownSimulation {
-        setup: &setup,
-        arrival: &arrival,
-        first_signal: Some(&signal),
-        guided_waves: &GUIDED_WAVES,
-        traces: None,
+    let solved = SolvedCase {
+        setup,
+        arrival,
+        first_signal: Some(signal),
+        guided_waves: GUIDED_WAVES,
         check: None,
     };
+    let shown = ShownSimulation { solved: &solved, traces: None };
     let text = unwrapped(&printed(OutputFormat::Text, |output| output.simulation(&shown).unwrap()));
     let expected = "no velocity of the second extremum: no arrival (receiver 3 has 1 extrema) \
                     decay along the array -0.5000 dB/cm guided waves";

@@ -6,9 +6,9 @@ use osteon_common::parameters::Parameter;
 use super::layout::{aligned, glued, wrapped};
 use super::number::significant;
 use super::result::{readable, scale};
-use crate::cost::{JobCost, PlaceCost};
 use crate::output::ShownCost;
 use crate::progress::span;
+use osteon_local::cost::{JobCost, PlaceCost};
 
 /// Digits of a time, which the next measurement will not repeat.
 const TIME_DIGITS: usize = 2;

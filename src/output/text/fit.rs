@@ -150,8 +150,8 @@ pub(super) fn uniqueness(
     let speed = (elasticity.rows()[0][0] / point.density()).sqrt();
     let speed = glued(&format!("√(c1111/ρ) = {} m/s", digits(speed, DIGITS)));
     let shown_below = identified::has_intervals(found);
-    let has_decays = specification.has_decays();
-    if searched - usize::from(dispersion) < if has_decays { 3 } else { 2 } {
+    let measured = specification.observables();
+    if searched - usize::from(dispersion) < 2 + measured.members().count() {
         return if shown_below {
             String::new()
         } else {
@@ -160,14 +160,14 @@ pub(super) fn uniqueness(
         };
     }
     let known = match specification.objective {
-        _ if has_decays => "Two moments and the mean decay",
+        _ if !measured.is_empty() => &format!("Two moments and the mean {}", measured.titles()),
         Objective::Moments | Objective::ChiSquare => "Two moments",
         Objective::Likelihood => "The distribution of one velocity",
     };
-    let fixed = match has_decays {
-        true => "the mean velocity, the coefficient of variation and the mean decay",
-        false => "the mean velocity and the coefficient of variation",
-    };
+    let mut fixed = "the mean velocity and the coefficient of variation".to_owned();
+    for observable in measured.members() {
+        fixed.push_str(&format!(", and the mean {}", observable.row().title));
+    }
     let nearest =
         is_reached(found, specification) && specification.search.method == SearchMethod::Newton;
     let this = if nearest {
@@ -180,7 +180,7 @@ pub(super) fn uniqueness(
         "{known} cannot determine {searched} parameters. The data fix {fixed}; {this} Fix parameters that are known from other measurements \
          (`fixed = …`) to narrow the others down."
     );
-    if found.posterior().is_none() && !has_decays {
+    if found.posterior().is_none() {
         let needed = match specification.data.as_ref().map(|data| &data.measurements) {
             Some(Measurements::Moments { count: None, .. }) => "With `data.count`, a",
             _ => "A",

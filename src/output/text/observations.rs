@@ -5,8 +5,8 @@ use osteon_common::visible;
 
 use super::layout::{aligned, wrapped};
 use super::number::{Decimals, digits};
-use crate::observations::{ObservableMoments, ObservationSummary};
 use crate::output::ShownObservations;
+use osteon_local::observations::{ObservableMoments, ObservationSummary};
 
 /// Digits of a standard deviation.
 const DEVIATION_DIGITS: usize = 4;

@@ -5,6 +5,8 @@ use std::path::Path;
 
 use osteon_client::result_status;
 use osteon_common::job::{JobSpecification, Objective, Range};
+use osteon_common::moments::ObservableEstimate;
+use osteon_common::observables::{Observable, ObservableRow};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::Status;
@@ -197,7 +199,7 @@ fn moments_and_cost(found: &Identification) -> String {
     let header = ["", "model ± standard error", "data", &interval.unwrap_or_default()];
     let mut rows = vec![header.map(str::to_owned)];
     rows.extend(moments(&found.velocity, found.data.as_ref()));
-    rows.extend(decay(found));
+    rows.extend(observables(found));
     if let Some(cost) = found.cost {
         let error = found.cost_standard_error.flatten().unwrap_or(f64::NAN);
         let (name, shown) = match found.objective {
@@ -228,12 +230,17 @@ fn moments(velocity: &Velocity, data: Option<&Data>) -> [[String; 4]; 2] {
     ]
 }
 
-/// Returns a row for the mean decay, if decays were measured.
-fn decay(found: &Identification) -> Option<[String; 4]> {
-    let (model, data) = (found.decay?, found.data.as_ref()?.decay?);
-    let model = measured(model.mean, model.standard_error);
-    let data = measured(data.mean, data.standard_error);
-    Some(["mean decay (dB/cm)".to_owned(), model, data, String::new()])
+/// Returns a row for the mean of each observable that was measured.
+fn observables(found: &Identification) -> Vec<[String; 4]> {
+    let of_data = found.data.as_ref().map(|data| data.observables).unwrap_or_default();
+    let row = |(observable, model): (Observable, &ObservableEstimate)| {
+        let data = of_data[observable]?;
+        let model = measured(model.mean, model.standard_error);
+        let data = measured(data.mean, data.standard_error);
+        let ObservableRow { short, unit, .. } = observable.row();
+        Some([format!("mean {short} ({unit})"), model, data, String::new()])
+    };
+    found.observables.present().filter_map(row).collect()
 }
 
 /// Returns a moment of the data and its interval, with the decimals of the interval's error;

@@ -6,15 +6,15 @@ use osteon_solver::{FirstSignal, GuidedWave};
 use super::layout::{aligned, wrapped};
 use super::number::{DIGITS, VELOCITY_DIGITS, digits, significant};
 use super::{check, solver};
-use crate::output::{ShownSimulation, solver_of};
+use crate::output::ShownSimulation;
 
 /// Significant digits of decay and frequency of a signal.
 const SIGNAL_DIGITS: usize = 4;
 
 /// Returns the outcome of one case, its times, its guided waves, and how they were computed.
 pub(super) fn table(simulation: &ShownSimulation<'_>) -> String {
-    let picking = simulation.setup.picking;
-    let mut text = match simulation.arrival {
+    let picking = simulation.solved.setup.picking;
+    let mut text = match &simulation.solved.arrival {
         Ok(arrival) => wrapped(&format!(
             "velocity {} m/s ({} extremum, threshold {:?} of the packet's peak)",
             digits(arrival.velocity, VELOCITY_DIGITS),
@@ -28,7 +28,7 @@ pub(super) fn table(simulation: &ShownSimulation<'_>) -> String {
             wrapped(&format!("no velocity: {kind}{detail}"))
         }
     };
-    if let Ok(arrival) = simulation.arrival {
+    if let Ok(arrival) = &simulation.solved.arrival {
         if let Some(directions) = arrival.directions {
             let [one, two] = directions.map(|velocity| digits(velocity, VELOCITY_DIGITS));
             text.push_str(&wrapped(&format!(
@@ -36,18 +36,18 @@ pub(super) fn table(simulation: &ShownSimulation<'_>) -> String {
             )));
         }
         text.push_str("\nreceiver  x1 (mm)   time (µs)\n");
-        let positions = simulation.setup.probe.receivers.positions();
+        let positions = simulation.solved.setup.probe.receivers.positions();
         for (j, (x1, time)) in positions.zip(&arrival.times).enumerate() {
             text.push_str(&format!("{:>8}  {:>7.3}  {:>10.5}\n", j + 1, x1 * 1e3, time * 1e6));
         }
     }
-    if let Some(signal) = simulation.first_signal {
+    if let Some(signal) = &simulation.solved.first_signal {
         text.push_str(&format!("\n{}", first_signal(signal)));
     }
     text.push_str(&format!("\n{}", guided_waves(simulation)));
-    let solver = solver_of(simulation.setup, simulation.arrival.as_ref().ok());
-    text.push_str(&format!("\n{}", wrapped(&solver::single_velocity_line(&solver))));
-    if let Some(check) = simulation.check {
+    let solver = solver::single_velocity_line(&simulation.solved.solver());
+    text.push_str(&format!("\n{}", wrapped(&solver)));
+    if let Some(check) = &simulation.solved.check {
         text.push_str(&format!("\n{}", check::table(check)));
     }
     if let Some(path) = simulation.traces {
@@ -79,8 +79,8 @@ fn first_signal(signal: &FirstSignal) -> String {
 
 /// Returns the velocities of the guided waves.
 fn guided_waves(simulation: &ShownSimulation<'_>) -> String {
-    let waves = simulation.guided_waves;
-    let is_attenuated = simulation.setup.layers.bone_attenuation.quality_factor.is_some();
+    let waves = &simulation.solved.guided_waves;
+    let is_attenuated = simulation.solved.setup.layers.bone_attenuation.quality_factor.is_some();
     let without = if is_attenuated { ", without its attenuation" } else { "" };
     let frequency = significant(waves.frequency * 1e-6, DIGITS);
     let mut text =

@@ -1,6 +1,7 @@
 //! Velocities as users have them.
 
 use osteon_common::job::{Data, Measurements};
+use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::Point;
 use osteon_common::realization::PointError;
 
@@ -85,8 +86,9 @@ fn in_series(velocities: &[f64], count: usize, generator: &mut Generator) -> Dat
         (mean + shared * (of_subject - mean) + own * (velocity - mean), subject as u32)
     };
     let (velocities, subjects) = others.iter().enumerate().map(one).unzip();
+    let observables = ObservedColumns::default();
     let measurements =
-        Measurements::Velocities { velocities, subjects: Some(subjects), decays: None };
+        Measurements::Velocities { velocities, subjects: Some(subjects), observables };
     Data { measurements, repeatability: 0.0 }
 }
 

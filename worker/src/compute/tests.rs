@@ -23,7 +23,7 @@ fn draw_work(point: Point, germs: GermSource, first: u64, count: u32) -> Work {
         point,
         germs,
         random: RandomQuantities::default(),
-        with_decays: false,
+        observables: osteon_common::observables::ObservableSet::NONE,
     };
     Work { evaluation: Arc::new(evaluation), first, count }
 }
@@ -59,11 +59,7 @@ fn outcomes_are_those_of_the_solver_alone() {
             .map(|index| {
                 let bone = ensemble.bone(index).unwrap();
                 let arrival = solver.arrival(&bone, &mut Workspace::default()).unwrap();
-                RealizationResult {
-                    outcome: Ok(arrival.velocity),
-                    estimated_error: arrival.estimated_error,
-                    decay: 0.0,
-                }
+                RealizationResult::solved(arrival.velocity, arrival.estimated_error)
             })
             .collect();
         assert_eq!(solve(2, draw_work(POINT, germs, 3, 4)), expected, "{scheme:?}");

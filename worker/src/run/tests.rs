@@ -130,7 +130,7 @@ fn work() -> Work {
         point: Point::of_bone([1.0; 7]),
         germs,
         random: RandomQuantities::default(),
-        with_decays: false,
+        observables: osteon_common::observables::ObservableSet::NONE,
     };
     Work { evaluation: Arc::new(evaluation), first: 7, count: 2 }
 }
@@ -187,13 +187,7 @@ impl Backend for FakeBackend {
 
 fn outcomes(work: &Work) -> Vec<RealizationResult> {
     let indices = work.first..work.first + u64::from(work.count);
-    indices
-        .map(|index| RealizationResult {
-            outcome: Ok(index as f64),
-            estimated_error: 0.0,
-            decay: 0.0,
-        })
-        .collect()
+    indices.map(|index| RealizationResult::solved(index as f64, 0.0)).collect()
 }
 
 #[tokio::test]

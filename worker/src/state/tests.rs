@@ -109,7 +109,7 @@ fn work() -> Work {
         point: POINT,
         germs,
         random: RandomQuantities::default(),
-        with_decays: false,
+        observables: osteon_common::observables::ObservableSet::NONE,
     };
     Work { evaluation: Arc::new(evaluation), first: 10, count: 2 }
 }
@@ -123,7 +123,7 @@ fn abandon(attachment: u64, batch: u64) -> Effect {
 }
 
 fn sample_results() -> Vec<RealizationResult> {
-    let success = RealizationResult { outcome: Ok(3900.0), estimated_error: 2e-5, decay: 0.0 };
+    let success = RealizationResult::solved(3900.0, 2e-5);
     vec![success, RealizationResult::failed(FailureKind::NoArrival)]
 }
 
@@ -134,7 +134,7 @@ fn answer(batch: u64) -> Effect {
         velocities: vec![3900.0, 0.0],
         elapsed_s: 0.5,
         estimated_errors: vec![2e-5, 0.0],
-        decays: Vec::new(),
+        observables: Vec::new(),
     }))
 }
 

@@ -4,6 +4,7 @@ use super::*;
 use crate::ensemble::Germs;
 use crate::inference::{Noise, data_noise};
 use crate::job::{Data, Group, Measurements};
+use crate::moments::MOMENTS;
 
 /// Draws values of the standard normal law.
 fn standard_normal(seed: u64) -> impl Iterator<Item = f64> {
@@ -186,7 +187,7 @@ fn random_effects(seed: u64) -> Group {
 
 /// Returns whether the intervals of the logarithms of both moments by the delta method hold them.
 fn delta_method_holds(data: &Data) -> [bool; 2] {
-    let noise = Noise { data: data_noise(data, 0), model: [0.0; 2] };
+    let noise = Noise { data: data_noise(data, 0), model: [0.0; MOMENTS] };
     let covariance = noise.covariance();
     let found = data.moments(0);
     let errors = [libm::log(found.mean / 3900.0), libm::log(found.coefficient_of_variation / 0.03)];

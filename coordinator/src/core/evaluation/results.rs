@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use osteon_common::observables::{Observable, ObservableSet, PerObservable};
 use osteon_common::outcome::{FailureKind, Outcome, RealizationResult};
 use osteon_common::outcomes::Outcomes;
 use osteon_common::quantile;
@@ -24,8 +25,8 @@ pub(crate) struct Results {
     /// [`NO_VELOCITY`] for a failure, otherwise at least 0. So the errors of the successes are found without
     /// reading the outcomes, of which there may be millions.
     estimated_errors: Vec<f64>,
-    /// Empty as long as every decay is 0.
-    decays: Arc<Vec<f64>>,
+    /// Each empty as long as every value is 0.
+    observables: PerObservable<Arc<Vec<f64>>>,
     /// Number of the worker that gave each result, or [`NOBODY`].
     owners: Vec<u32>,
     /// Number of results.
@@ -40,7 +41,7 @@ impl Results {
         Self {
             outcomes: Arc::new(Vec::with_capacity(realizations)),
             estimated_errors: Vec::with_capacity(realizations),
-            decays: Arc::default(),
+            observables: PerObservable::default(),
             owners: Vec::with_capacity(realizations),
             filled: 0,
             filled_of_piece: Vec::new(),
@@ -70,8 +71,9 @@ impl Results {
             Ok(_) => *self.estimated_errors.get(index)?,
             Err(_) => 0.0,
         };
-        let decay = self.decays.get(index).copied().unwrap_or_default();
-        Some(RealizationResult { outcome, estimated_error, decay })
+        let value = |values: &Arc<Vec<f64>>| values.get(index).copied().unwrap_or_default();
+        let observables = self.observables.as_ref().map(value);
+        Some(RealizationResult { outcome, estimated_error, observables })
     }
 
     /// Fills the indices from `first` on that have no result with these results of a worker. The number of
@@ -84,10 +86,7 @@ impl Results {
         self.estimated_errors.resize(length, NO_VELOCITY);
         self.owners.resize(length, NOBODY);
         self.filled_of_piece.resize(length.div_ceil(PIECE_OUTCOMES), 0);
-        let decays = Arc::make_mut(&mut self.decays);
-        if !decays.is_empty() || solved.iter().any(|result| result.decay.to_bits() != 0) {
-            decays.resize(length, 0.0);
-        }
+        let mut columns = Self::columns_with(&mut self.observables, solved, length);
         let places = self.owners[first..end].iter_mut().zip(solved).enumerate();
         for (index, (owned, result)) in places.filter(|(_, (owned, _))| **owned == NOBODY) {
             *owned = owner;
@@ -97,10 +96,28 @@ impl Results {
             if result.outcome.is_ok() {
                 self.estimated_errors[first + index] = result.estimated_error;
             }
-            if let Some(decay) = decays.get_mut(first + index) {
-                *decay = result.decay;
+            for (observable, column) in columns.iter_mut() {
+                column[first + index] = result.observables[*observable];
             }
         }
+    }
+
+    /// Returns the columns of the observables that these results or earlier ones have, of this length.
+    fn columns_with<'a>(
+        columns: &'a mut PerObservable<Arc<Vec<f64>>>,
+        solved: &[RealizationResult],
+        length: usize,
+    ) -> Vec<(Observable, &'a mut Vec<f64>)> {
+        let has_values =
+            |one: Observable| solved.iter().any(|result| result.observables[one].to_bits() != 0);
+        let all = Observable::ALL.into_iter().zip(&mut columns.0);
+        let used = all.filter(|(one, column)| !column.is_empty() || has_values(*one));
+        let sized = used.map(|(one, column)| {
+            let column = Arc::make_mut(column);
+            column.resize(length, 0.0);
+            (one, column)
+        });
+        sized.collect()
     }
 
     /// Returns the runs of consecutive indices that have a result, or that have none.
@@ -132,28 +149,40 @@ impl Results {
         counts.filter(|(_, filled)| **filled == PIECE_OUTCOMES).map(|(piece, _)| piece)
     }
 
-    /// Returns a copy of the outcomes of indices that have a result, `with_decays` or without; `None` if
+    /// Returns a copy of the outcomes of indices that have a result, with these observables; `None` if
     /// there are fewer indices.
-    pub(crate) fn outcomes_in(&self, indices: Range<usize>, with_decays: bool) -> Option<Outcomes> {
+    pub(crate) fn outcomes_in(
+        &self,
+        indices: Range<usize>,
+        observables: ObservableSet,
+    ) -> Option<Outcomes> {
         let outcomes = self.outcomes.get(indices.clone())?.to_vec();
-        let decays = with_decays.then(|| match self.decays.get(indices) {
-            Some(decays) => decays.to_vec(),
-            None => vec![0.0; outcomes.len()],
+        let columns = PerObservable::new(|one| {
+            observables[one].then(|| match self.observables[one].get(indices.clone()) {
+                Some(values) => values.to_vec(),
+                None => vec![0.0; outcomes.len()],
+            })
         });
-        Some(Outcomes::from(outcomes).with_decays(decays))
+        Some(Outcomes::from(outcomes).with_observables(columns))
     }
 
-    /// Returns all outcomes in index order, `with_decays` or without; `None` unless there are as many
-    /// as `realizations`.
-    pub(crate) fn outcomes(&self, realizations: u64, with_decays: bool) -> Option<Outcomes> {
+    /// Returns all outcomes in index order, with these observables; `None` unless there are as many as
+    /// `realizations`.
+    pub(crate) fn outcomes(
+        &self,
+        realizations: u64,
+        observables: ObservableSet,
+    ) -> Option<Outcomes> {
         if self.filled != realizations || self.len() as u64 != realizations {
             return None;
         }
-        let decays = with_decays.then(|| match self.decays.is_empty() {
-            true => Arc::new(vec![0.0; self.len()]),
-            false => Arc::clone(&self.decays),
+        let columns = PerObservable::new(|one| {
+            observables[one].then(|| match self.observables[one].is_empty() {
+                true => Arc::new(vec![0.0; self.len()]),
+                false => Arc::clone(&self.observables[one]),
+            })
         });
-        Some(Outcomes::shared(Arc::clone(&self.outcomes), decays))
+        Some(Outcomes::shared(Arc::clone(&self.outcomes), columns))
     }
 
     /// Returns the estimated errors of the successes.
@@ -168,12 +197,7 @@ mod tests {
     use super::*;
 
     fn solved(velocities: &[f64]) -> Vec<RealizationResult> {
-        let result = |velocity: &f64| RealizationResult {
-            outcome: Ok(*velocity),
-            estimated_error: *velocity,
-            decay: 0.0,
-        };
-        velocities.iter().map(result).collect()
+        velocities.iter().map(|one| RealizationResult::solved(*one, *one)).collect()
     }
 
     #[test]
@@ -197,24 +221,29 @@ mod tests {
         let same = |first| results.of_same_owner(first, 9);
         assert_eq!([0, 1, 2, 3, 4, 5].map(same), [0, 2, 1, 1, 1, 0]);
         assert_eq!(results.of_same_owner(1, 1), 1);
-        assert_eq!(results.outcomes(5, false), None);
+        assert_eq!(results.outcomes(5, ObservableSet::NONE), None);
         results.fill(0, &solved(&[10.0]), 2);
-        assert_eq!(results.outcomes(6, false), None);
-        let complete = results.outcomes(5, false).unwrap();
+        assert_eq!(results.outcomes(6, ObservableSet::NONE), None);
+        let complete = results.outcomes(5, ObservableSet::NONE).unwrap();
         assert_eq!(&*complete, [10.0, 11.0, 12.0, 3.0, 14.0].map(Ok));
     }
 
     #[test]
-    fn decays_are_kept_from_the_first_one_on() {
+    fn observables_are_kept_from_the_first_one_on() {
+        let wanted = PerObservable::new(|one| one == Observable::Decay);
+        let decays = |results: &Results, count, wanted| {
+            let outcomes = results.outcomes(count, wanted).unwrap();
+            outcomes.observables()[Observable::Decay].map(<[f64]>::to_vec)
+        };
         let mut results = Results::with_room_for(3);
         results.fill(0, &solved(&[1.0]), 0);
-        assert_eq!(results.outcomes(1, true).unwrap().decays(), Some(&[0.0][..]));
+        assert_eq!(decays(&results, 1, wanted), Some(vec![0.0]));
         let mut later = solved(&[2.0, 3.0]);
-        later[1].decay = -4.5;
+        later[1].observables[Observable::Decay] = -4.5;
         results.fill(1, &later, 0);
         assert_eq!(results.get(2), Some(later[1]));
-        assert_eq!(results.outcomes(3, true).unwrap().decays(), Some(&[0.0, 0.0, -4.5][..]));
-        assert_eq!(results.outcomes(3, false).unwrap().decays(), None);
+        assert_eq!(decays(&results, 3, wanted), Some(vec![0.0, 0.0, -4.5]));
+        assert_eq!(decays(&results, 3, ObservableSet::NONE), None);
     }
 
     #[test]

@@ -209,8 +209,7 @@ fn hello_on(host: &str, worker: u64, process: u32, threads: u32) -> Event {
 
 /// Returns an answer whose velocities follow from the indices, computed in `elapsed_s`.
 fn answer_in(elapsed_s: f64, worker: u64, batch: u64, first: u64, count: u64) -> Event {
-    let solved =
-        |index| RealizationResult { outcome: velocity(index), estimated_error: 0.0, decay: 0.0 };
+    let solved = |index| RealizationResult::solved(velocity(index).unwrap(), 0.0);
     let solved = (first..first + count).map(solved).collect();
     Event::Answered { worker: WorkerId(worker), batch: BatchId(batch), solved, elapsed_s }
 }

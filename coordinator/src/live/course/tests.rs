@@ -63,7 +63,7 @@ fn specification() -> JobSpecification {
         name: name.to_owned(),
         velocities: (0..20).map(|k| base + 20.0 * f64::from(k)).collect(),
         subjects: None,
-        decays: None,
+        observables: osteon_common::observables::ObservedColumns::default(),
         known: KnownQuantities::default(),
     };
     specification.data = Some(Data::from_groups(vec![group("a", 3800.0), group("b", 3900.0)]));
@@ -76,7 +76,7 @@ fn row(specification: &JobSpecification, number: u64, group: u32) -> Evaluation 
         role: EvaluationRole { group, ..EvaluationRole::default() },
         point: specification.start_of(0),
         moments: Some(Moments { mean: 3900.0, coefficient_of_variation: 0.03 }),
-        decay: None,
+        observables: osteon_common::observables::ObservableMeans::default(),
         cost: Some(1.0 / (number + 1) as f64),
         failures: FailureCounts::default(),
         estimated_error: None,

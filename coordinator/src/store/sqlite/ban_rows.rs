@@ -10,14 +10,14 @@ use crate::core::ids::JobId;
 use crate::core::worker_name::WorkerName;
 use crate::store::{BanRecord, DoubtRecord};
 
-/// The tables beside that of the bans. Earlier versions had none.
+/// The tables beside that of the bans.
 pub(super) const TABLES: &str = "
-    CREATE TABLE IF NOT EXISTS lift (    -- bans that an operator has lifted
+    CREATE TABLE lift (                  -- bans that an operator has lifted
         ban INTEGER PRIMARY KEY,
         at_ns INTEGER NOT NULL,          -- since the Unix epoch
         checksum BLOB NOT NULL
     );
-    CREATE TABLE IF NOT EXISTS doubt (   -- ended jobs with answers of a host that was banned later
+    CREATE TABLE doubt (                 -- ended jobs with answers of a host that was banned later
         job INTEGER NOT NULL REFERENCES job(id),
         ban INTEGER NOT NULL,
         digest TEXT,                     -- of the result that was computed again since; NULL before

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use osteon_common::observables::{OBSERVABLES, ObservedColumns, PerObservable};
 use osteon_common::outcome::{Outcome, decode, encode};
 use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Point};
 use osteon_common::results::EstimatedError;
@@ -106,11 +107,14 @@ pub(super) fn checksum(fields: &[&[u8]]) -> Vec<u8> {
     hasher.finalize().as_bytes().to_vec()
 }
 
-/// First byte of a blob whose records are followed by a decay each; no record begins with it.
-const DECAYS_FOLLOW: u8 = 0xFF;
+/// First byte of a blob whose records are followed by columns of observables; no record begins with it.
+const COLUMNS_FOLLOW: u8 = 0xFF;
 
-/// Packs outcomes, one record after the other; with decays, as [`with_decays`] says.
-pub(super) fn pack_outcomes(outcomes: &[Outcome], decays: Option<&[f64]>) -> Vec<u8> {
+/// Packs outcomes, one record after the other; with observables, as [`with_columns`] says.
+pub(super) fn pack_outcomes(
+    outcomes: &[Outcome],
+    observables: PerObservable<Option<&[f64]>>,
+) -> Vec<u8> {
     let mut packed = vec![0; outcomes.len() * OUTCOME_BYTES];
     let (records, _) = packed.as_chunks_mut::<OUTCOME_BYTES>();
     for (record, &outcome) in records.iter_mut().zip(outcomes) {
@@ -118,37 +122,51 @@ pub(super) fn pack_outcomes(outcomes: &[Outcome], decays: Option<&[f64]>) -> Vec
         record[0] = code;
         record[1..].copy_from_slice(&velocity.to_le_bytes());
     }
-    with_decays(packed, decays)
+    with_columns(packed, observables)
 }
 
-/// Returns a blob of records followed by the decays of all of them as little-endian f64, with a byte
-/// before them that no record begins with; without decays, the records alone.
-pub(super) fn with_decays(mut records: Vec<u8>, decays: Option<&[f64]>) -> Vec<u8> {
-    if let Some(decays) = decays {
-        records.extend(decays.iter().flat_map(|decay| decay.to_le_bytes()));
-        records.insert(0, DECAYS_FOLLOW);
+/// Returns a blob of records. If there are observables, it begins with a byte that no record begins with,
+/// and a byte with a bit for each of them, and the records are followed by the values of each observable
+/// as little-endian f64.
+pub(super) fn with_columns(
+    records: Vec<u8>,
+    observables: PerObservable<Option<&[f64]>>,
+) -> Vec<u8> {
+    if observables.set().is_empty() {
+        return records;
     }
-    records
+    let bits = observables.present().map(|(one, _)| 1 << (one as u8)).sum();
+    let mut blob = vec![COLUMNS_FOLLOW, bits];
+    blob.extend(records);
+    for (_, values) in observables.present() {
+        blob.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    }
+    blob
 }
 
-/// Returns the records of a blob, of `RECORD` bytes each, and the decays that follow them, if any; `None`
-/// if it is damaged.
-pub(super) fn without_decays<const RECORD: usize>(
+/// Returns the records of a blob, of `RECORD` bytes each, and the observables that follow them; `None` if
+/// it is damaged.
+pub(super) fn without_columns<const RECORD: usize>(
     packed: &[u8],
-) -> Option<(&[u8], Option<Vec<f64>>)> {
-    let Some((&DECAYS_FOLLOW, both)) = packed.split_first() else {
-        return Some((packed, None));
+) -> Option<(&[u8], ObservedColumns)> {
+    let [COLUMNS_FOLLOW, bits, both @ ..] = packed else {
+        return Some((packed, ObservedColumns::default()));
     };
-    let count = both.len() / (RECORD + 8);
-    let (records, decays) = both.split_at_checked(count * RECORD)?;
-    let (decays, rest) = decays.as_chunks::<8>();
-    let whole = rest.is_empty() && decays.len() == count;
-    whole.then(|| (records, Some(decays.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())))
+    let has = PerObservable::new(|one| bits & (1 << (one as u8)) != 0);
+    let row_bytes = RECORD + 8 * has.members().count();
+    if *bits == 0 || *bits >= 1 << OBSERVABLES || both.len() % row_bytes != 0 {
+        return None;
+    }
+    let count = both.len() / row_bytes;
+    let (records, values) = both.split_at(count * RECORD);
+    let mut values = values.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes));
+    let columns = PerObservable::new(|one| has[one].then(|| values.by_ref().take(count).collect()));
+    Some((records, columns))
 }
 
-/// Returns outcomes, and their decays if they have any; `None` if they are damaged.
-pub(super) fn unpack_outcomes(packed: &[u8]) -> Option<(Vec<Outcome>, Option<Vec<f64>>)> {
-    let (packed, decays) = without_decays::<OUTCOME_BYTES>(packed)?;
+/// Returns outcomes and their observables; `None` if they are damaged.
+pub(super) fn unpack_outcomes(packed: &[u8]) -> Option<(Vec<Outcome>, ObservedColumns)> {
+    let (packed, columns) = without_columns::<OUTCOME_BYTES>(packed)?;
     let (records, rest) = packed.as_chunks::<OUTCOME_BYTES>();
     if !rest.is_empty() {
         return None;
@@ -158,12 +176,12 @@ pub(super) fn unpack_outcomes(packed: &[u8]) -> Option<(Vec<Outcome>, Option<Vec
     for [code, velocity @ ..] in records {
         outcomes.push(decode(*code, f64::from_le_bytes(*velocity))?);
     }
-    let fits = |(outcome, decay): (&Outcome, &f64)| match outcome {
-        Ok(_) => decay.is_finite(),
-        Err(_) => decay.to_bits() == 0,
+    let fits = |(outcome, value): (&Outcome, &f64)| match outcome {
+        Ok(_) => value.is_finite(),
+        Err(_) => value.to_bits() == 0,
     };
-    let consistent = outcomes.iter().zip(decays.iter().flatten()).all(fits);
-    consistent.then_some((outcomes, decays))
+    let consistent = columns.present().all(|(_, values)| outcomes.iter().zip(values).all(fits));
+    consistent.then_some((outcomes, columns))
 }
 
 pub(super) fn pack_errors(errors: EstimatedError) -> Vec<u8> {

@@ -7,6 +7,7 @@
 //! SQLite copies a row several times. Copies of a piece stay in the cache of the processor, and the next
 //! piece uses their memory again; a row of 90 MB took twice as long as its pieces.
 
+use osteon_common::observables::ObservedColumns;
 use osteon_common::outcome::Outcome;
 use osteon_common::outcomes::Outcomes;
 use rusqlite::{Connection, OptionalExtension as _, Row, params};
@@ -20,7 +21,7 @@ use crate::store::{EvaluationRecord, PIECE_OUTCOMES, PieceRecord};
 
 /// The table of pieces.
 pub(super) const TABLE: &str = "
-    CREATE TABLE IF NOT EXISTS piece (   -- of a large evaluation
+    CREATE TABLE piece (                 -- of a large evaluation
         job INTEGER NOT NULL,
         evaluation INTEGER NOT NULL,     -- number
         first INTEGER NOT NULL,          -- index
@@ -79,7 +80,7 @@ fn put_pieces(connection: &Connection, record: &EvaluationRecord) -> rusqlite::R
 
 /// Adds a piece of an evaluation, unless it is there.
 pub(super) fn put_piece(connection: &Connection, record: &PieceRecord) -> rusqlite::Result<()> {
-    let outcomes = pack_outcomes(&record.outcomes, record.outcomes.decays());
+    let outcomes = pack_outcomes(&record.outcomes, record.outcomes.observables());
     put_packed(connection, (record.job, record.number, record.first), &outcomes).map(drop)
 }
 
@@ -146,8 +147,9 @@ const LOOSE: &str = "FROM piece WHERE job = ?1 AND NOT EXISTS (SELECT 1 FROM eva
 /// Returns the outcomes of a row, from this index on.
 fn packed(record: &EvaluationRecord, first: usize) -> Vec<u8> {
     let end = record.outcomes.len().min(first + PIECE_OUTCOMES);
-    let decays = record.outcomes.decays().map(|decays| &decays[first..end]);
-    pack_outcomes(&record.outcomes[first..end], decays)
+    let observables =
+        record.outcomes.observables().map(|values| values.map(|values| &values[first..end]));
+    pack_outcomes(&record.outcomes[first..end], observables)
 }
 
 /// Returns an evaluation; `None` if there is none, and `None` inside if it is damaged.
@@ -165,8 +167,8 @@ pub(super) fn get(
     connection.query_row(sql, params![job.0, number], read).optional()
 }
 
-/// Outcomes with their decays, if they have any.
-type Unpacked = (Vec<Outcome>, Option<Vec<f64>>);
+/// Outcomes with their observables.
+type Unpacked = (Vec<Outcome>, ObservedColumns);
 
 /// The pieces of an evaluation, in order.
 #[derive(Default)]
@@ -228,19 +230,19 @@ fn evaluation(
 /// Returns the outcomes of an evaluation from those of its row and of its pieces; `None` unless each
 /// begins where the one before it ends.
 fn joined(
-    (mut outcomes, mut decays): Unpacked,
+    (mut outcomes, mut columns): Unpacked,
     pieces: Vec<(usize, Unpacked)>,
 ) -> Option<Outcomes> {
-    for (first, (more, more_decays)) in pieces {
-        if first != outcomes.len() || more_decays.is_some() != decays.is_some() {
+    for (first, (more, more_columns)) in pieces {
+        if first != outcomes.len() || more_columns.set() != columns.set() {
             return None;
         }
         outcomes.extend(more);
-        if let Some(decays) = &mut decays {
-            decays.extend(more_decays.into_iter().flatten());
+        for (observable, values) in more_columns.present() {
+            columns[observable].get_or_insert_default().extend(values);
         }
     }
-    Some(Outcomes::from(outcomes).with_decays(decays))
+    Some(Outcomes::from(outcomes).with_observables(columns))
 }
 
 fn piece_checksum(job: JobId, number: u64, first: u64, outcomes: &[u8]) -> Vec<u8> {

@@ -2,6 +2,7 @@
 //! must give a typed error or a record, never a panic, within a limit of processor time. A record
 //! that is read is written and read again, unchanged.
 
+use osteon_common::observables::PerObservable;
 use osteon_fuzz::{CASES, bounded, bytes, check, damaged, here};
 use osteon_proto::{history, v1};
 
@@ -38,7 +39,8 @@ fn accepted<T>(read: Result<Option<T>, StoreError>) -> Option<T> {
 /// Writes `damage` into one column of an evaluation and reads it.
 fn check_evaluation(store: &mut SqliteStore, column: usize, damage: &[u8]) {
     let whole = evaluation(1, 2);
-    let (point, outcomes) = (pack_point(whole.point), pack_outcomes(&whole.outcomes, None));
+    let (point, outcomes) =
+        (pack_point(whole.point), pack_outcomes(&whole.outcomes, PerObservable::default()));
     let errors = whole.estimated_error.map(pack_errors).unwrap_or_default();
     let workers = pack_workers(&whole.workers).into_bytes();
     let mut columns = [point, outcomes, errors, workers];

@@ -17,10 +17,7 @@ use super::{ban_rows, evaluation_rows, parts};
 use crate::store::StoreError;
 
 /// The format that this program writes.
-pub(super) const FORMAT: i64 = 9;
-/// The formats before [`FORMAT`]: in the first an evaluation has no pieces, and in both bans are not lifted.
-/// A file with such a format is read, and its format is changed to [`FORMAT`].
-pub(super) const FORMER: [i64; 2] = [7, 8];
+pub(super) const FORMAT: i64 = 1;
 /// Name of the file in the store's directory.
 pub(super) const FILE: &str = "osteon.sqlite";
 /// Name of the lock file, which names the process that has the store open.
@@ -163,7 +160,7 @@ fn check_format(connection: &Connection, path: &Path) -> Result<(), StoreError> 
     let found: i64 = connection
         .query_row("SELECT version FROM format", [], |row| row.get(0))
         .map_err(refused)?;
-    if found == FORMAT || FORMER.contains(&found) {
+    if found == FORMAT {
         Ok(())
     } else {
         Err(StoreError::Format { path: path.to_owned(), found, known: FORMAT })
@@ -207,12 +204,10 @@ fn prepare(connection: &mut Connection, journal: Journal) -> rusqlite::Result<()
     if !known {
         transaction.execute_batch("CREATE TABLE format (version INTEGER NOT NULL)")?;
         transaction.execute("INSERT INTO format VALUES (?1)", [FORMAT])?;
-        transaction.execute_batch(SCHEMA)?;
+        for tables in [SCHEMA, evaluation_rows::TABLE, ban_rows::TABLES, parts::TABLE] {
+            transaction.execute_batch(tables)?;
+        }
     }
-    transaction.execute_batch(evaluation_rows::TABLE)?;
-    transaction.execute_batch(ban_rows::TABLES)?;
-    transaction.execute("UPDATE format SET version = ?1", [FORMAT])?;
-    transaction.execute_batch(parts::TABLE)?;
     parts::delete_of_ended(&transaction)?;
     evaluation_rows::delete_loose_pieces(&transaction)?;
     transaction.commit()

@@ -4,30 +4,31 @@
 
 use std::collections::VecDeque;
 
+use osteon_common::observables::PerObservable;
 use osteon_common::outcome::{RealizationResult, decode, encode};
 use osteon_common::version;
 use rusqlite::{Connection, params};
 
 use super::columns::{
-    checksum, pack_point, pack_worker, unpack, unpack_worker, with_decays, without_decays,
+    checksum, pack_point, pack_worker, unpack, unpack_worker, with_columns, without_columns,
 };
 use super::evaluation_rows::{delete_some_loose_pieces, has_loose_pieces};
 use crate::core::ids::JobId;
 use crate::store::{PartPiece, PartRecord};
 
-/// The table. Earlier versions had none, and a file without it is one without parts.
+/// The table.
 pub(super) const TABLE: &str = "
-    CREATE TABLE IF NOT EXISTS part (    -- of evaluations that are not stored yet
+    CREATE TABLE part (                  -- of evaluations that are not stored yet
         number INTEGER PRIMARY KEY,
         job INTEGER NOT NULL REFERENCES job(id),
         point BLOB NOT NULL,             -- as of an evaluation
         worker TEXT NOT NULL,            -- that gave the results: PROCESS/INSTANCE HOST
         first INTEGER NOT NULL,          -- index
-        results BLOB NOT NULL,           -- per index: code byte, velocity, estimated error (f64); with decays as of an evaluation
+        results BLOB NOT NULL,           -- per index: code byte, velocity, estimated error (f64); with observables as of an evaluation
         fingerprint TEXT NOT NULL,       -- of the numerics
         checksum BLOB NOT NULL
     );
-    CREATE UNIQUE INDEX IF NOT EXISTS part_place ON part (job, point, first, worker);
+    CREATE UNIQUE INDEX part_place ON part (job, point, first, worker);
 ";
 
 /// Number of pieces that are deleted at once: a record may wait for it.
@@ -188,22 +189,25 @@ fn pack_results(results: &[RealizationResult]) -> Vec<u8> {
         packed.extend(velocity.to_le_bytes());
         packed.extend(result.estimated_error.to_le_bytes());
     }
-    let has_decays = results.iter().any(|result| result.decay.to_bits() != 0);
-    let decays: Vec<f64> = results.iter().map(|result| result.decay).collect();
-    with_decays(packed, has_decays.then_some(&decays))
+    let columns = PerObservable::new(|one| {
+        let has_values = results.iter().any(|result| result.observables[one].to_bits() != 0);
+        has_values.then(|| results.iter().map(|result| result.observables[one]).collect::<Vec<_>>())
+    });
+    with_columns(packed, columns.as_ref().map(Option::as_deref))
 }
 
 fn unpack_results(packed: &[u8]) -> Option<Vec<RealizationResult>> {
-    let (packed, decays) = without_decays::<RESULT_BYTES>(packed)?;
-    let mut decays = decays.into_iter().flatten();
+    let (packed, columns) = without_columns::<RESULT_BYTES>(packed)?;
     let (records, rest) = packed.as_chunks::<RESULT_BYTES>();
     let number = |bytes: &[u8]| bytes.try_into().ok().map(f64::from_le_bytes);
-    let result = |[code, numbers @ ..]: &[u8; RESULT_BYTES]| {
+    let result = |(index, [code, numbers @ ..]): (usize, &[u8; RESULT_BYTES])| {
         let (velocity, error) = numbers.split_at(8);
         let outcome = decode(*code, number(velocity)?)?;
-        let (estimated_error, decay) = (number(error)?, decays.next().unwrap_or(0.0));
-        let result = RealizationResult { outcome, estimated_error, decay };
+        let estimated_error = number(error)?;
+        let value = |column: &Option<Vec<f64>>| column.as_ref().map_or(0.0, |all| all[index]);
+        let observables = columns.as_ref().map(value);
+        let result = RealizationResult { outcome, estimated_error, observables };
         result.is_consistent().then_some(result)
     };
-    rest.is_empty().then(|| records.iter().map(result).collect()).flatten()
+    rest.is_empty().then(|| records.iter().enumerate().map(result).collect()).flatten()
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
+use osteon_common::observables::{Observable, ObservedValues, PerObservable};
 use osteon_common::outcome::{FailureCounts, FailureKind};
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
@@ -110,7 +111,7 @@ pub(super) fn summary(job: u64) -> Summary {
         role: EvaluationRole { group: 1, start: 2, ..EvaluationRole::default() },
         point: evaluation(job, number).point,
         moments: (number == 1).then_some(Moments { mean: 0.1, coefficient_of_variation: 0.3 }),
-        decay: None,
+        observables: PerObservable::default(),
         cost: Some(if number == 1 { 1e-300 } else { f64::INFINITY }),
         failures: FailureCounts::from_outcomes(&evaluation(job, number).outcomes),
         estimated_error: evaluation(job, number).estimated_error,

@@ -43,7 +43,7 @@ fn data() -> impl Strategy<Value = Data> {
                     name: format!("{name}{i}"),
                     velocities: vec![1999.0, 2000.0 + i as f64],
                     subjects: None,
-                    decays: None,
+                    observables: osteon_common::observables::ObservedColumns::default(),
                     known: known_quantities(i, known),
                 };
                 Data::from_groups(names.iter().enumerate().map(group).collect())

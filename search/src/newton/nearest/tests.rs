@@ -11,8 +11,14 @@ fn least_over_the_box(slopes: &[f64], at: &[f64]) -> f64 {
     along.sum()
 }
 
-fn residual(rows: &Rows, right: [f64; 2], at: &[f64]) -> [f64; 2] {
-    [0, 1].map(|i| dot(&rows[i], at) - right[i])
+fn residual(rows: &Rows, right: MomentVector, at: &[f64]) -> MomentVector {
+    array::from_fn(|i| dot(&rows[i], at) - right[i])
+}
+
+/// Returns these rows and as many rows of zeros as there are missing.
+fn padded<const N: usize>(rows: [Vec<f64>; N]) -> Rows {
+    let length = rows[0].len();
+    array::from_fn(|i| rows.get(i).cloned().unwrap_or_else(|| vec![0.0; length]))
 }
 
 fn unit(dimension: usize) -> impl Strategy<Value = Vec<f64>> {
@@ -25,8 +31,10 @@ fn problem() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Rows)> {
     (1_usize..=7).prop_flat_map(|dimension| {
         let entry = prop_oneof![3 => -1.0..1.0_f64, 1 => Just(0.0)];
         let row = || prop::collection::vec(entry.clone(), dimension);
-        (unit(dimension), unit(dimension), row(), row())
-            .prop_map(|(start, other, first, second)| (start, other, [first, second]))
+        let third = prop_oneof![1 => row(), 1 => Just(vec![0.0; dimension])];
+        (unit(dimension), unit(dimension), row(), row(), third).prop_map(
+            |(start, other, first, second, third)| (start, other, padded([first, second, third])),
+        )
     })
 }
 
@@ -36,7 +44,7 @@ properties! {
     /// For the nearest point x of a convex set, no direction from x to another of its points leads
     /// towards the start.
     fn of_the_solutions_it_is_the_nearest((start, other, rows) in problem()) {
-        let right = [0, 1].map(|i| dot(&rows[i], &other));
+        let right = array::from_fn(|i| dot(&rows[i], &other));
         let at = nearest(&start, &rows, right);
         prop_assert!(at.iter().all(|u| (0.0..=1.0).contains(u)));
         let missed = residual(&rows, right, &at);
@@ -53,12 +61,13 @@ properties! {
     /// coordinates inside the box by 1e-5.
     fn without_a_solution_it_is_the_least_squares(
         (start, _, rows) in problem(),
-        right in prop::array::uniform2(-6.0..6.0_f64),
+        right in prop::array::uniform3(-6.0..6.0_f64),
     ) {
+        let right = array::from_fn(|i| right.get(i).copied().unwrap_or(0.0));
         let at = nearest(&start, &rows, right);
         let missed = residual(&rows, right, &at);
         let gradient: Vec<f64> =
-            (0..at.len()).map(|i| rows[0][i] * missed[0] + rows[1][i] * missed[1]).collect();
+            (0..at.len()).map(|i| rows.iter().zip(missed).map(|(row, r)| row[i] * r).sum()).collect();
         let least = least_over_the_box(&gradient, &at);
         prop_assert!(least > -1e-4, "{least} at {at:?}");
     }
@@ -66,8 +75,8 @@ properties! {
 
 #[test]
 fn a_start_that_solves_stays() {
-    let rows = [vec![0.5, 0.25, 0.0], vec![0.0, 0.0, 1.0]];
-    let at = nearest(&[0.5, 0.5, 0.25], &rows, [0.375, 0.25]);
+    let rows = padded([vec![0.5, 0.25, 0.0], vec![0.0, 0.0, 1.0]]);
+    let at = nearest(&[0.5, 0.5, 0.25], &rows, [0.375, 0.25, 0.0, 0.0, 0.0]);
     assert_eq!(at, [0.5, 0.5, 0.25]);
 }
 
@@ -75,12 +84,12 @@ fn a_start_that_solves_stays() {
 fn what_one_coordinate_cannot_the_others_do() {
     // The step from (0.9, 0.5) by (0.3, 0.3) leaves the box: the first coordinate stops, the second
     // continues.
-    let rows = [vec![1.0, 1.0], vec![0.0, 0.0]];
-    let at = nearest(&[0.9, 0.2], &rows, [1.7, 0.0]);
+    let rows = padded([vec![1.0, 1.0]]);
+    let at = nearest(&[0.9, 0.2], &rows, [1.7, 0.0, 0.0, 0.0, 0.0]);
     assert!((at[0] - 1.0).abs() < 1e-9 && (at[1] - 0.7).abs() < 1e-9, "{at:?}");
 }
 
 #[test]
 fn without_coordinates_there_is_one_point() {
-    assert_eq!(nearest(&[], &[vec![], vec![]], [1.0, 2.0]), Vec::<f64>::new());
+    assert_eq!(nearest(&[], &padded([vec![]]), [1.0; MOMENTS]), Vec::<f64>::new());
 }

@@ -171,12 +171,14 @@ fn no_point_that_matches_is_nearer() {
 /// point that is nearer by a margin.
 #[test]
 fn only_what_is_clearly_nearer_is_taken() {
+    let logarithms =
+        |moments: Moments| ComparedMoments::from(moments).in_logarithms(&moments.into());
     let data = logarithms(rule(&OPTIMUM));
     let mut taken = 0;
     for (_, start) in starts().take(1000) {
         let space = all_free(&start);
         let start = space.start();
-        let mut model = Model::new(space, start.clone(), [0.0; 2]);
+        let mut model = Model::new(space, start.clone(), [0.0; MOMENTS]);
         model.make_exact_at(&start, logarithms(rule(&space.point(&start))));
         let (alone, all) = (model.nearest_from_here(&start, data), model.nearest(&start, data));
         if alone != all {

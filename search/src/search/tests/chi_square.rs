@@ -57,7 +57,7 @@ fn what_is_known_best_is_missed_least() {
             assert!((smallest..largest).contains(&off), "{method:?} {objective:?}: {off} errors");
             if objective == Objective::ChiSquare {
                 let weights = MomentWeights::of_data(&wanted, 0).unwrap();
-                let expected = weights.cost(wanted.moments(0), moments);
+                let expected = weights.cost(&wanted.compared(0), &moments.into());
                 assert_eq!(best.cost.unwrap(), expected);
                 let reason = ending.reason.unwrap();
                 assert!(reason.contains("best χ² (of at most 2 degrees of freedom)"), "{reason}");

@@ -98,17 +98,19 @@ fn unusable(
     assignment: &Assignment,
     solved: &[RealizationResult],
 ) -> Option<CloseReason> {
-    if lacks_decays(state, assignment, solved) {
-        return Some(CloseReason::Malformed(Malformed::Missing { field: "decays" }));
+    if lacks_observables(state, assignment, solved) {
+        return Some(CloseReason::Malformed(Malformed::Missing { field: "observables" }));
     }
     implausible(state, assignment, solved)
 }
 
-/// Returns whether the job asks for decays and a velocity has none: the worker does not know of decays.
-fn lacks_decays(state: &State, assignment: &Assignment, solved: &[RealizationResult]) -> bool {
+/// Returns whether the job asks for an observable that a velocity lacks: the worker does not know it.
+fn lacks_observables(state: &State, assignment: &Assignment, solved: &[RealizationResult]) -> bool {
     let job = state.jobs.get(&assignment.job);
-    job.is_some_and(|job| job.record.specification.has_decays())
-        && solved.iter().any(|one| one.outcome.is_ok() && one.decay.to_bits() == 0)
+    job.is_some_and(|job| {
+        let wanted = job.record.specification.observables();
+        solved.iter().any(|one| one.lacks_one(wanted))
+    })
 }
 
 /// Returns whether a worker has not given its proof of the setup of a batch that it answers.

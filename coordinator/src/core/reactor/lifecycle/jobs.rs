@@ -40,7 +40,7 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
         complete_aside(turn, id);
         return;
     }
-    let Some((outcomes, estimated_error)) = evaluation.complete(job.search.has_decays()) else {
+    let Some((outcomes, estimated_error)) = evaluation.complete(job.search.observables()) else {
         return;
     };
     let (number, point) = (evaluation.number, evaluation.point);

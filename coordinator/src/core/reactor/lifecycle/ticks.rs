@@ -148,7 +148,7 @@ pub(crate) fn store_pieces(turn: &mut Turn) {
         // The numbers of evaluations that the search has not asked for may still change.
         if let Stage::Computing(evaluation) = &mut job.stage {
             let attempt = evaluation.attempt;
-            let pieces = saved::take_pieces(evaluation, *id, job.search.has_decays()).into_iter();
+            let pieces = saved::take_pieces(evaluation, *id, job.search.observables()).into_iter();
             let stored = pieces.map(|record| Effect::Store(Record::Piece { record, attempt }));
             turn.effects.extend(stored);
         }

@@ -35,7 +35,7 @@ fn bone(effect: &Effect) -> Option<Event> {
         let mean = 3900.0 * (point.0[1] / 17.717e9).sqrt();
         let deviate = [-1.0, 1.0, -0.5, 0.5][index as usize % 4];
         let velocity = mean * (1.0 + 0.3 * point.dispersion() * deviate);
-        RealizationResult { outcome: Ok(velocity), estimated_error: 0.0, decay: 0.0 }
+        RealizationResult::solved(velocity, 0.0)
     });
     let (worker, batch, solved) = (*worker, *batch, solved.collect());
     Some(Event::Answered { worker, batch, solved, elapsed_s: 0.1 })

@@ -21,14 +21,12 @@ fn rig(realizations: u64, workers: u32) -> Rig {
 pub(super) fn wrong_answer(worker: u64, batch: u64, index: u64, off: RealizationResult) -> Event {
     let Ok(right) = velocity(index) else { panic!("a velocity") };
     let Ok(off_by) = off.outcome else { panic!("a velocity") };
-    let outcome = Ok(f64::from_bits(right.to_bits() + off_by as u64));
-    let solved =
-        vec![RealizationResult { outcome, estimated_error: off.estimated_error, decay: 0.0 }];
+    let velocity = f64::from_bits(right.to_bits() + off_by as u64);
+    let solved = vec![RealizationResult::solved(velocity, off.estimated_error)];
     Event::Answered { worker: WorkerId(worker), batch: BatchId(batch), solved, elapsed_s: 0.1 }
 }
 
-pub(super) const ONE_BIT: RealizationResult =
-    RealizationResult { outcome: Ok(1.0), estimated_error: 0.0, decay: 0.0 };
+pub(super) const ONE_BIT: RealizationResult = RealizationResult::solved(1.0, 0.0);
 
 #[test]
 fn an_audited_batch_is_computed_by_another_worker() {
@@ -208,7 +206,7 @@ fn a_third_worker_decides_against_the_second() {
 fn an_estimated_error_is_an_answer_too() {
     let mut rig = rig(1, 3);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
-    let off = RealizationResult { outcome: Ok(0.0), estimated_error: 1e-9, decay: 0.0 };
+    let off = RealizationResult::solved(0.0, 1e-9);
     rig.check(wrong_answer(2, 2, 0, off), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
     assert!(effects[0].starts_with("store ban 1: node-2 (process 2)"), "{effects:?}");

@@ -192,7 +192,7 @@ fn full_pieces_of_a_large_evaluation_are_stored_before_it_is_complete() {
     let fill = |rig: &mut Rig, first, count| {
         let job = rig.state.jobs.get_mut(&JobId(1)).unwrap();
         let Stage::Computing(evaluation) = &mut job.stage else { panic!("nothing is computed") };
-        let result = RealizationResult { outcome: Ok(3900.0), estimated_error: 1e-5, decay: 0.0 };
+        let result = RealizationResult::solved(3900.0, 1e-5);
         let solved = vec![result; usize::try_from(count).unwrap()];
         evaluation.fill(Indices { first, count }, &solved, &WorkerName::new("node", 1, 1));
     };

@@ -49,7 +49,7 @@ fn a_job_is_counted_from_its_acceptance_to_its_end() {
     counted.rig.now += Duration::from_secs(2);
     assert_eq!(counted.measure().oldest_batch, Duration::from_secs(2));
     let failed = RealizationResult::failed(FailureKind::NoArrival);
-    let solved = RealizationResult { outcome: velocity(0), estimated_error: 0.0, decay: 0.0 };
+    let solved = RealizationResult::solved(velocity(0).unwrap(), 0.0);
     let answer = |worker| Event::Answered {
         worker: WorkerId(worker),
         batch: BatchId(1),

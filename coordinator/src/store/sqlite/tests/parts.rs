@@ -10,7 +10,7 @@ pub(super) fn part(job: u64, number: u64) -> PartRecord {
     let result = |k: u32| RealizationResult {
         outcome: if k == 1 { Err(FailureKind::NoArrival) } else { Ok(3900.0 + f64::from(k)) },
         estimated_error: if k == 1 { 0.0 } else { 1e-5 * f64::from(k) },
-        decay: 0.0,
+        observables: ObservedValues::NONE,
     };
     let piece = |first: u64, process| PartPiece {
         first,
@@ -33,16 +33,18 @@ fn store() -> (tempfile::TempDir, SqliteStore) {
     (directory, store)
 }
 
-/// Decays are stored with their outcomes, and a blob without them is as it always was.
+/// Observables are stored with their outcomes, and a blob without them has no byte of them.
 #[test]
-fn decays_are_kept() {
+fn observables_are_kept() {
     let (directory, mut store) = store();
     let mut with = part(1, 2);
-    with.pieces[0].results[0].decay = 4.625;
-    with.pieces[0].results[2].decay = -0.5;
+    with.pieces[0].results[0].observables[Observable::Decay] = 4.625;
+    with.pieces[0].results[2].observables[Observable::Decay] = -0.5;
     store.put_part(&with).unwrap();
     let mut record = evaluation(1, 0);
-    record.outcomes = record.outcomes.with_decays(Some([4.6, 0.0, -0.5].into()));
+    record.outcomes = record
+        .outcomes
+        .with_observables(PerObservable::only(Observable::Decay, vec![4.6, 0.0, -0.5]));
     store.put_evaluation(&record, true).unwrap();
     store.settle();
     drop(store);
@@ -54,12 +56,14 @@ fn decays_are_kept() {
         let rows = read.query_map([], |row| row.get(0)).unwrap();
         rows.map(Result::unwrap).collect()
     };
-    assert_eq!(lengths("SELECT length(outcomes) FROM evaluation"), [1 + 3 * 17]);
+    assert_eq!(lengths("SELECT length(outcomes) FROM evaluation"), [2 + 3 * 17]);
     // The parts of the evaluation that is stored are gone.
     let parts = lengths("SELECT length(results) FROM part WHERE job = 1 ORDER BY number");
-    assert_eq!(parts, [51, 51, 1 + 3 * 25, 51]);
+    assert_eq!(parts, [51, 51, 2 + 3 * 25, 51]);
     // The outcome without a velocity has a decay.
-    record.outcomes = record.outcomes.with_decays(Some([4.6, 1.0, -0.5].into()));
+    record.outcomes = record
+        .outcomes
+        .with_observables(PerObservable::only(Observable::Decay, vec![4.6, 1.0, -0.5]));
     store.put_evaluation(&record, true).unwrap();
     let damaged = store.evaluation(JobId(1), 0).unwrap_err();
     assert!(matches!(damaged, StoreError::Damaged { .. }), "{damaged}");

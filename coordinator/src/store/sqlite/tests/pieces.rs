@@ -1,9 +1,6 @@
 //! Large evaluations, whose outcomes are in several rows.
 
-use super::super::columns::{
-    evaluation_checksum, pack_errors, pack_outcomes, pack_point, pack_workers,
-};
-use super::super::opening::FORMAT;
+use super::super::columns::pack_outcomes;
 use super::*;
 use crate::store::{PIECE_OUTCOMES, PieceRecord};
 
@@ -29,7 +26,7 @@ pub(super) fn has(store: &SqliteStore, record: &PieceRecord) -> bool {
     let of = params![record.job.0, record.number, record.first];
     let found: Option<Vec<u8>> =
         store.connection.query_row(sql, of, |row| row.get(0)).optional().unwrap();
-    found.is_some_and(|found| found == pack_outcomes(&record.outcomes, None))
+    found.is_some_and(|found| found == pack_outcomes(&record.outcomes, PerObservable::default()))
 }
 
 fn store() -> (tempfile::TempDir, SqliteStore) {
@@ -56,7 +53,8 @@ fn a_large_evaluation_is_read_as_it_was_written() {
         (0..).zip(counts).map(|(number, count)| large(number, count)).collect();
     let mut with_decays = large(5, 150_000);
     let of_it = decays(&with_decays);
-    with_decays.outcomes = with_decays.outcomes.with_decays(Some(of_it));
+    with_decays.outcomes =
+        with_decays.outcomes.with_observables(PerObservable::only(Observable::Decay, of_it));
     records.push(with_decays);
     for record in &records {
         store.put_evaluation(record, true).unwrap();
@@ -162,16 +160,19 @@ fn pieces_with_decays_agree_with_the_record() {
     let decays: Vec<f64> =
         whole.outcomes.iter().map(|outcome| outcome.map_or(0.0, |v| v / 1000.0)).collect();
     let early = PieceRecord {
-        outcomes: piece(0, PIECE_OUTCOMES)
-            .outcomes
-            .with_decays(Some(decays[PIECE_OUTCOMES..2 * PIECE_OUTCOMES].to_vec())),
+        outcomes: piece(0, PIECE_OUTCOMES).outcomes.with_observables(PerObservable::only(
+            Observable::Decay,
+            decays[PIECE_OUTCOMES..2 * PIECE_OUTCOMES].to_vec(),
+        )),
         ..piece(0, PIECE_OUTCOMES)
     };
     store.put_piece(&early).unwrap();
     let row = "SELECT rowid FROM piece WHERE first = 65536";
     let before = rows(&store, row);
-    let whole =
-        EvaluationRecord { outcomes: whole.outcomes.with_decays(Some(decays)), ..large(0, 1) };
+    let whole = EvaluationRecord {
+        outcomes: whole.outcomes.with_observables(PerObservable::only(Observable::Decay, decays)),
+        ..large(0, 1)
+    };
     store.put_evaluation(&whole, true).unwrap();
     assert_eq!(rows(&store, row), before, "it was written again");
     assert!(store.evaluation(JobId(1), 0).unwrap() == Some(whole));
@@ -203,35 +204,6 @@ fn a_damaged_piece_is_damage_to_its_evaluation() {
             "{sql}: {error}"
         );
     }
-}
-
-#[test]
-fn a_file_of_the_former_format_is_read_and_becomes_one_of_this() {
-    let (directory, mut store) = store();
-    let records = [large(0, 3), large(1, 2 * PIECE_OUTCOMES)];
-    for record in &records {
-        store.put_evaluation(record, true).unwrap();
-    }
-    // As the former version wrote the second one: in one row.
-    let record = &records[1];
-    let (outcomes, point) = (pack_outcomes(&record.outcomes, None), pack_point(record.point));
-    let errors = record.estimated_error.map(pack_errors);
-    let workers = pack_workers(&record.workers);
-    let of = (record.job, record.number);
-    let checksum = evaluation_checksum(of, &point, (&outcomes, &[]), errors.as_deref(), &workers);
-    let sql = "UPDATE evaluation SET outcomes = ?1, checksum = ?2 WHERE number = 1";
-    store.connection.execute(sql, params![outcomes, checksum]).unwrap();
-    store.connection.execute_batch("DROP TABLE piece; UPDATE format SET version = 7").unwrap();
-    drop(store);
-    let mut store = SqliteStore::open(directory.path()).unwrap();
-    assert_eq!(rows(&store, "SELECT version FROM format"), [FORMAT]);
-    for record in &records {
-        let read = store.evaluation(JobId(1), record.number).unwrap();
-        assert!(read.as_ref() == Some(record), "evaluation {} was read otherwise", record.number);
-    }
-    let more = large(2, PIECE_OUTCOMES + 1);
-    store.put_evaluation(&more, true).unwrap();
-    assert!(store.evaluation(JobId(1), 2).unwrap() == Some(more));
 }
 
 #[test]

@@ -1,0 +1,109 @@
+//! The likelihood of one set of data as a function of the compared moments of a model.
+
+use osteon_common::data_likelihood::DataLikelihood;
+use osteon_common::inference::MomentWeights;
+use osteon_common::job::{JobSpecification, Measurements};
+use osteon_common::moments::{ComparedMoments, MOMENTS, MomentVector, Moments};
+use osteon_common::observables::ObservableSet;
+
+/// The likelihood of the velocities, times that of the means of the other observables given the
+/// velocities.
+///
+/// The latter are averages, so their law is close to normal; that its covariance is estimated from the
+/// same data makes it Student's (A. Gelman et al., Bayesian Data Analysis (2013), Sec. 3.6): with χ² the
+/// square of the difference in its standard errors, and n independent parts of the data, the logarithm is
+/// -n/2 ln(1 + χ²/(n - 1)).
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SetLikelihood {
+    pub(super) velocities: DataLikelihood,
+    observables: Option<Observed>,
+    /// The data's moments, to which the model's are relative.
+    pub(super) data: ComparedMoments,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Observed {
+    weights: MomentWeights,
+    /// The data's moments in the coordinates of the model's.
+    data: MomentVector,
+    /// Number of independent parts of the data.
+    parts: f64,
+}
+
+impl SetLikelihood {
+    /// Creates the likelihood of set number `set` of the data; `None` if their noise is unknown.
+    pub(crate) fn new(specification: &JobSpecification, set: usize) -> Option<Self> {
+        let data = specification.data.as_ref()?;
+        let compared = data.compared(set);
+        let observables = match data.observables().is_empty() {
+            true => None,
+            false => Some(Observed {
+                weights: MomentWeights::of_data(data, set)?,
+                data: compared.in_logarithms(&compared),
+                parts: data.set(set)?.parts() as f64,
+            }),
+        };
+        let velocities = of_velocities(specification, set)?;
+        Some(Self { velocities, observables, data: compared })
+    }
+
+    /// Returns the likelihood of a model whose moments have these relative standard errors, which are the
+    /// same at every point, as common germs make them: its average over normal errors.
+    #[must_use]
+    pub(super) fn with_model_errors(self, errors: MomentVector) -> Self {
+        let [mean, variation, ..] = errors;
+        let observables = self.observables.map(|observed| Observed {
+            weights: observed.weights.with_errors_of_observables(&errors),
+            ..observed
+        });
+        let velocities = self.velocities.with_model_errors([mean, variation]);
+        Self { velocities, observables, ..self }
+    }
+
+    /// Returns the logarithm of the likelihood of a model with these moments, as
+    /// [`ComparedMoments::in_logarithms`] of the data, up to a constant, nats.
+    pub(super) fn log(&self, values: &MomentVector) -> f64 {
+        let of_observables = self.observables.as_ref().map_or(0.0, |observed| {
+            let differences: MomentVector = std::array::from_fn(|k| values[k] - observed.data[k]);
+            let square = observed.weights.square_given_velocities(differences);
+            -0.5 * observed.parts * libm::log1p(square / (observed.parts - 1.0))
+        });
+        self.velocities.log([values[0], values[1]]) + of_observables
+    }
+
+    /// Returns the observables that were measured.
+    pub(super) fn observables(&self) -> ObservableSet {
+        self.data.observables.set()
+    }
+
+    /// Returns rough standard errors of the data's moments, of the observables given the velocities, as a
+    /// measure of misfit; infinite of an observable that was not measured.
+    pub(super) fn errors(&self) -> MomentVector {
+        let mut errors = [f64::INFINITY; MOMENTS];
+        errors[..2].copy_from_slice(&self.velocities.errors());
+        for (axis, error) in errors.iter_mut().enumerate().skip(2) {
+            let mut one = [0.0; MOMENTS];
+            one[axis] = 1.0;
+            let observed = self.observables.as_ref();
+            let weight = observed.map_or(0.0, |observed| observed.weights.square(one));
+            *error = 1.0 / weight.sqrt();
+        }
+        errors
+    }
+}
+
+fn of_velocities(specification: &JobSpecification, set: usize) -> Option<DataLikelihood> {
+    let data = specification.data.as_ref()?;
+    let instrument = data.repeatability;
+    match (&data.measurements, data.velocities(set), data.subjects(set)) {
+        (&Measurements::Moments { mean, coefficient_of_variation, count }, ..) => {
+            let moments = Moments { mean, coefficient_of_variation };
+            DataLikelihood::from_moments(moments, count?, instrument)
+        }
+        (_, Some(velocities), Some(subjects)) => {
+            DataLikelihood::of_subjects(velocities, subjects, instrument)
+        }
+        (_, Some(velocities), None) => DataLikelihood::independent(velocities, instrument),
+        (_, None, _) => None,
+    }
+}

@@ -1,0 +1,66 @@
+//! `report`: results as a page with figures.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use osteon_client::report_directory::{self, REPORT};
+
+use super::{Performance, WingCommand};
+use crate::exit_status::{CommandFailure, ExitStatus};
+use crate::progress::say;
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArguments {
+    /// Directory of results. Several are laid over each other and compared with the first
+    #[arg(value_name = "DIR", required = true, num_args = 1..=16)]
+    directories: Vec<PathBuf>,
+    /// Directory for the report [default: the folder report in the first DIR]
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Option of commands that write results.
+#[derive(Debug, Clone, PartialEq, Eq, Args)]
+pub(crate) struct ReportOption {
+    /// Also write a report of the results to DIR/report, as `osteon report DIR` does
+    #[arg(long, requires = "out")]
+    report: bool,
+}
+
+impl ReportOption {
+    /// Writes the report of the results in `directory` to its folder `report`, and says where it is, if
+    /// it is wanted.
+    ///
+    /// # Errors
+    /// If the results cannot be read, or the report cannot be written.
+    pub(crate) fn write(&self, directory: Option<&Path>) -> Result<(), CommandFailure> {
+        let Some(directory) = directory.filter(|_| self.report) else { return Ok(()) };
+        let page = report_directory::write(
+            &directory.join(REPORT),
+            &[report_directory::read(directory)?],
+        )?;
+        say(&format!("report: {page}"));
+        Ok(())
+    }
+}
+
+impl WingCommand for ReportArguments {
+    fn perform(self: Box<Self>) -> Performance {
+        Box::pin(async move { report(&self) })
+    }
+}
+
+/// Reads the results, and writes their report.
+fn report(arguments: &ReportArguments) -> Result<ExitStatus, CommandFailure> {
+    let directories = &arguments.directories;
+    let out = match (&arguments.out, directories.first()) {
+        (Some(out), _) => out.clone(),
+        (None, first) => first.map(|first| first.join(REPORT)).unwrap_or_default(),
+    };
+    let runs = directories.iter().map(|directory| report_directory::read(directory));
+    let runs = runs.collect::<Result<Vec<_>, _>>()?;
+    let page = report_directory::write(&out, &runs)?;
+    say(&page);
+    Ok(ExitStatus::Done)
+}
