@@ -109,7 +109,7 @@ async fn measure(
 ) -> Result<String> {
     // One of each before the first turn.
     let (_, id) = run(client, job).await?;
-    let (points, digest) = left(client, &id).await?;
+    let (points, digest) = read_output(client, &id).await?;
     let [mut service_s, mut loop_s, mut realization_s] = [f64::INFINITY; 3];
     for turn in 0..=turns {
         let begun = Instant::now();
@@ -122,7 +122,7 @@ async fn measure(
         }
         ensure!(found.finish() == digest, "the bare loop has other velocities than job {id}");
         let (job_s, id) = run(client, job).await?;
-        ensure!(left(client, &id).await?.1 == digest, "job {id} has other velocities");
+        ensure!(read_output(client, &id).await?.1 == digest, "job {id} has other velocities");
         if turn > 0 {
             let count = points.len() as f64 * bare.count as f64;
             loop_s = loop_s.min(seconds);
@@ -208,7 +208,7 @@ async fn run(client: &mut JobsClient<Channel>, job: &JobSpecification) -> Result
 }
 
 /// The points that an ended job evaluated, and the digest of all that came out.
-async fn left(client: &mut JobsClient<Channel>, job: &str) -> Result<(Vec<Point>, String)> {
+async fn read_output(client: &mut JobsClient<Channel>, job: &str) -> Result<(Vec<Point>, String)> {
     let mut parts = client.fetch(FetchRequest { job: job.to_owned() }).await?.into_inner();
     let (mut points, mut digest) = (Vec::new(), None);
     while let Some(message) = parts.message().await? {
@@ -239,7 +239,7 @@ fn identification(propagation: &JobSpecification) -> JobSpecification {
         *range = Range::Free { start: range.start(), lower, upper };
     }
     job.search.max_evaluations = EVALUATIONS;
-    // They would be beside the path that the digest is of.
+    // Their evaluations are beside the path of the search, and the digest is of the path alone.
     job.search.sensitivities = false;
     job
 }

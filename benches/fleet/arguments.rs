@@ -94,7 +94,7 @@ impl FleetArguments {
         for &each in &self.each {
             for &workers in &self.workers {
                 let row = Row { workers, slots: self.slots, each, job, disturbance: None };
-                let alone = row.ideal(job.expected(), job.chain_max());
+                let alone = row.ideal(job.expected_realizations(), job.chain_max());
                 ensure!(
                     alone <= IDEAL_MAX,
                     "--each: {each:?} on --workers {workers} takes {alone:.0?}, and at most \

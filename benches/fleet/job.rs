@@ -22,8 +22,8 @@ use crate::grouped::{OF_GROUP, grouped};
 const CONNECT_LIMIT: Duration = Duration::from_secs(10);
 /// Wait before a coordinator is asked again.
 const RETRY: Duration = Duration::from_millis(20);
-/// Evaluations that the search for a group takes, about.
-const OF_SEARCH: u64 = 12;
+/// Usual number of evaluations of the search for a group.
+const EVALUATIONS_OF_GROUP: u64 = 12;
 
 /// A job to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,14 +54,14 @@ impl Job {
 
     /// Returns the job before it, which is not measured.
     pub(crate) fn warm_up(self) -> JobSpecification {
-        fake::propagation((self.expected() / 10).clamp(1, 100_000), 1)
+        fake::propagation((self.expected_realizations() / 10).clamp(1, 100_000), 1)
     }
 
     /// Returns the number of realizations that it takes; of an identification, about.
-    pub(crate) fn expected(self) -> u64 {
+    pub(crate) fn expected_realizations(self) -> u64 {
         match self {
             Self::Propagation(realizations) => realizations,
-            Self::Groups(groups) => groups as u64 * OF_SEARCH * OF_GROUP,
+            Self::Groups(groups) => groups as u64 * EVALUATIONS_OF_GROUP * OF_GROUP,
             Self::Search { evaluations, realizations } => evaluations * realizations,
         }
     }

@@ -48,7 +48,7 @@ pub(crate) struct Measured {
 pub(crate) async fn measure(row: &Row) -> Result<Measured> {
     let coordinator = CoordinatorProcess::start()?;
     let fleet = Fleet::start(coordinator.url().parse()?, row.workers, row.slots, row.each);
-    let attached = timeout(ATTACH_LIMIT, fleet.attached()).await;
+    let attached = timeout(ATTACH_LIMIT, fleet.wait_for_attachments()).await;
     attached.with_context(|| {
         format!("only {} workers attach: {}", fleet.progress().welcomes, fleet.last_loss())
     })?;
@@ -94,9 +94,11 @@ impl Bench {
         job: &JobSpecification,
         disturbance: Option<Disturbance>,
     ) -> Result<(Duration, String)> {
-        let limit =
-            10 * self.row.ideal(self.row.job.expected(), self.row.job.chain_max()) + JOB_LIMIT;
-        let half = self.fleet.progress().realizations + self.row.job.expected().div_ceil(2);
+        let limit = 10
+            * self.row.ideal(self.row.job.expected_realizations(), self.row.job.chain_max())
+            + JOB_LIMIT;
+        let half =
+            self.fleet.progress().realizations + self.row.job.expected_realizations().div_ceil(2);
         let Self { coordinator, fleet, client, .. } = self;
         let begun = Instant::now();
         let id = client.submit(job).await?;
@@ -124,7 +126,7 @@ async fn disturb(
     done: &mut bool,
 ) -> Error {
     if let Some(disturbance) = disturbance {
-        fleet.reached(half).await;
+        fleet.wait_for_answers(half).await;
         *done = true;
         match disturbance {
             Disturbance::Workers(count, behaviour) => fleet.order(count, behaviour),

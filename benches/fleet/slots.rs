@@ -54,12 +54,12 @@ impl Slots {
     }
 
     /// Returns when the next batch ends.
-    pub(crate) fn next(&self) -> Option<Instant> {
+    pub(crate) fn next_end(&self) -> Option<Instant> {
         self.held.front().map(|held| held.ends)
     }
 
     /// Returns the batch that ends next, if it has ended.
-    pub(crate) fn ended(&mut self, now: Instant) -> Option<Held> {
+    pub(crate) fn take_ended(&mut self, now: Instant) -> Option<Held> {
         self.held.pop_front_if(|held| held.ends <= now)
     }
 

@@ -89,12 +89,12 @@ impl Fleet {
     }
 
     /// Returns when all workers have been attached.
-    pub(crate) async fn attached(&self) {
+    pub(crate) async fn wait_for_attachments(&self) {
         self.wait_for(|progress| progress.welcomes >= self.workers.into()).await;
     }
 
     /// Returns when so many realizations have been answered.
-    pub(crate) async fn reached(&self, realizations: u64) {
+    pub(crate) async fn wait_for_answers(&self, realizations: u64) {
         self.wait_for(|progress| progress.realizations >= realizations).await;
     }
 
@@ -216,11 +216,11 @@ impl Attachment {
                 Behaviour::Work | Behaviour::Silent => {}
             }
             let works = behaviour == Behaviour::Work;
-            let next = self.slots.next().filter(|_| works);
+            let next = self.slots.next_end().filter(|_| works);
             tokio::select! {
                 biased;
                 changed = self.orders.changed() => changed?,
-                () = at(next) => self.answer().await?,
+                () = sleep_until_time(next) => self.answer().await?,
                 message = self.stream.message() => {
                     let message = message?.context("the coordinator closed the stream")?;
                     self.on_message(message, works)?;
@@ -252,7 +252,7 @@ impl Attachment {
 
     /// Answers the batch that has ended.
     async fn answer(&mut self) -> Result<()> {
-        let Some(held) = self.slots.ended(Instant::now()) else { return Ok(()) };
+        let Some(held) = self.slots.take_ended(Instant::now()) else { return Ok(()) };
         let answer = batch::answer_to_message(held.batch, &held.solved, held.elapsed_s());
         self.send(Request::Result(answer)).await?;
         self.shared.progress.send_modify(|progress| {
@@ -270,7 +270,7 @@ impl Attachment {
 }
 
 /// Completes at this time; never, if there is none.
-async fn at(time: Option<Instant>) {
+async fn sleep_until_time(time: Option<Instant>) {
     match time {
         Some(time) => sleep_until(time).await,
         None => std::future::pending().await,

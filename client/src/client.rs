@@ -64,7 +64,7 @@ impl Client {
     ) -> Result<Self, ClientError> {
         let Remote { endpoint, files, unused, .. } = remote;
         let found = async {
-            let credentials = loaded(files, endpoint).await?;
+            let credentials = load_credentials(files, endpoint).await?;
             let left = ANSWER_S_MAX - SILENCE_S_MAX;
             let notice = || format!("cannot reach {endpoint}; trying for {left} more seconds");
             with_wait_notice(Self::find(endpoint, &credentials), &*listener, notice).await
@@ -149,7 +149,7 @@ impl Client {
                 call.metadata_mut().insert(TRACEPARENT, context);
             }
             let call = self.jobs.submit(call);
-            let error = match self.peer.answered_within(&mut patience, call).await {
+            let error = match self.peer.wait_for_answer_within(&mut patience, call).await {
                 Ok(response) => return Ok(response.job),
                 Err(error) => error,
             };
@@ -179,7 +179,7 @@ impl Client {
         let mut page_token = String::new();
         for _ in 0..PAGES_MAX {
             let call = self.jobs.list(v1::ListRequest { page_size: 0, page_token });
-            let page = self.peer.answered(call).await?;
+            let page = self.peer.wait_for_answer(call).await?;
             jobs.extend(page.jobs);
             concerns.extend(page.concerns);
             page_token = page.next_page_token;
@@ -193,7 +193,7 @@ impl Client {
     /// Returns the workers that are banned because they computed wrongly.
     pub async fn banned(&mut self) -> Result<Vec<v1::BannedWorker>, ClientError> {
         let call = self.jobs.list_bans(v1::ListBansRequest {});
-        Ok(self.peer.answered(call).await?.workers)
+        Ok(self.peer.wait_for_answer(call).await?.workers)
     }
 
     /// Deletes ended jobs; returns the ids of the deleted ones.
@@ -204,13 +204,13 @@ impl Client {
     ) -> Result<Vec<String>, ClientError> {
         let keep_for_s = older_than.map(|age| age.as_secs_f64());
         let call = self.jobs.prune(v1::PruneRequest { keep_for_s, keep_last });
-        Ok(self.peer.answered(call).await?.jobs)
+        Ok(self.peer.wait_for_answer(call).await?.jobs)
     }
 
     /// Cancels a job; returns its state afterwards.
     pub async fn cancel(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
         let call = self.jobs.cancel(v1::CancelRequest { job: job.to_owned() });
-        let snapshot = self.peer.answered(call).await?.snapshot;
+        let snapshot = self.peer.wait_for_answer(call).await?.snapshot;
         self.present(snapshot, "snapshot")
     }
 
@@ -256,8 +256,8 @@ impl Client {
         let call = self.jobs.watch(v1::WatchRequest { job: job.to_owned(), after: 0 });
         let limit = || Patience::new(answer_limit());
         let answered = match search {
-            None => self.peer.answered_within(&mut limit(), call).await,
-            Some(search) => self.peer.answered_within(search, call).await,
+            None => self.peer.wait_for_answer_within(&mut limit(), call).await,
+            Some(search) => self.peer.wait_for_answer_within(search, call).await,
         };
         let mut stream = match answered {
             Ok(stream) => stream,
@@ -276,7 +276,7 @@ impl Client {
                     let endpoint = self.peer.endpoint.clone();
                     return Ok(Err(ClientError::Lost { endpoint, reason }));
                 }
-                Err(status) => return Ok(Err(self.peer.refused(&status))),
+                Err(status) => return Ok(Err(self.peer.interpret_refusal(&status))),
             };
             *search = None;
             show(&snapshot)?;
@@ -300,7 +300,7 @@ impl Client {
 
     async fn fetch_once(&mut self, job: &str) -> Result<Fetched, ClientError> {
         let call = self.jobs.fetch(v1::FetchRequest { job: job.to_owned() });
-        let mut stream = self.peer.answered(call).await?;
+        let mut stream = self.peer.wait_for_answer(call).await?;
         let mut parts = FetchedParts::default();
         loop {
             let mut patience = Patience::new(answer_limit());
@@ -310,13 +310,13 @@ impl Client {
             match message {
                 Ok(Some(message)) => {
                     let part = self.present(message.part, "part")?;
-                    parts.add(part).map_err(|source| self.malformed(source))?;
+                    parts.add(part).map_err(|source| self.malformed_answer(source))?;
                 }
                 Ok(None) => break,
-                Err(status) => return Err(self.peer.refused(&status)),
+                Err(status) => return Err(self.peer.interpret_refusal(&status)),
             }
         }
-        parts.assemble().map_err(|source| self.malformed(source))
+        parts.assemble().map_err(|source| self.malformed_answer(source))
     }
 
     pub(crate) fn present<T>(
@@ -324,10 +324,10 @@ impl Client {
         field: Option<T>,
         name: &'static str,
     ) -> Result<T, ClientError> {
-        field.ok_or_else(|| self.malformed(Malformed::Missing { field: name }))
+        field.ok_or_else(|| self.malformed_answer(Malformed::Missing { field: name }))
     }
 
-    pub(crate) fn malformed(&self, source: Malformed) -> ClientError {
+    pub(crate) fn malformed_answer(&self, source: Malformed) -> ClientError {
         ClientError::Malformed { endpoint: self.peer.endpoint.clone(), source }
     }
 }
@@ -338,7 +338,7 @@ pub fn job_status(snapshot: &JobSnapshot) -> Option<JobStatus> {
 }
 
 /// Reads the credential files on another thread, so that signals are handled while a pipe is read.
-pub(crate) async fn loaded(
+pub(crate) async fn load_credentials(
     files: &CredentialFiles,
     endpoint: &Endpoint,
 ) -> Result<Credentials, ClientError> {

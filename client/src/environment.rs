@@ -61,10 +61,10 @@ impl Environment {
     /// # Errors
     /// Same as [`from_process`](Self::from_process).
     pub fn read(variable: impl Fn(&str) -> Option<OsString>) -> Result<Self, EnvironmentError> {
-        let given = |name| variable(name).filter(|value| !value.is_empty());
-        let file = |name| given(name).map(PathBuf::from);
+        let read_nonempty = |name| variable(name).filter(|value| !value.is_empty());
+        let file = |name| read_nonempty(name).map(PathBuf::from);
         let text = |name| {
-            let text = given(name).map(OsString::into_string).transpose();
+            let text = read_nonempty(name).map(OsString::into_string).transpose();
             text.map_err(|value| EnvironmentError::NotUnicode { variable: name, value })
         };
         Ok(Self {
@@ -116,12 +116,12 @@ impl Environment {
         let encrypted = matches!(endpoint, Endpoint::Https(_));
         let private = encrypted || endpoint.is_local();
         let own = options.certificate.is_some() || options.key.is_some();
-        let found = |file: &Option<PathBuf>, wanted: bool| file.clone().filter(|_| wanted);
+        let file_if = |file: &Option<PathBuf>, wanted: bool| file.clone().filter(|_| wanted);
         let wanted = CredentialFiles {
-            ca: found(&self.files.ca, encrypted && options.ca.is_none()),
-            certificate: found(&self.files.certificate, encrypted && !own),
-            key: found(&self.files.key, encrypted && !own),
-            token: found(&self.files.token, private && options.token.is_none()),
+            ca: file_if(&self.files.ca, encrypted && options.ca.is_none()),
+            certificate: file_if(&self.files.certificate, encrypted && !own),
+            key: file_if(&self.files.key, encrypted && !own),
+            token: file_if(&self.files.token, private && options.token.is_none()),
         };
         match &self.coordinator {
             Some(other) if !is_at(other, endpoint) => (options, Unused::from_files(&wanted)),
@@ -195,11 +195,11 @@ mod tests {
     }
 
     fn all() -> Environment {
-        of_coordinator(Some("https://a:1"))
+        environment_of(Some("https://a:1"))
     }
 
     /// An environment with every file, and the given coordinator.
-    fn of_coordinator(named: Option<&str>) -> Environment {
+    fn environment_of(named: Option<&str>) -> Environment {
         let mut variables =
             vec![(TLS_CA, "ca"), (TLS_CERT, "cert"), (TLS_KEY, "key"), (TOKEN_FILE, "token")];
         variables.extend(named.map(|url| (COORDINATOR, url)));
@@ -207,7 +207,7 @@ mod tests {
     }
 
     /// Returns authority, certificate, key and token that are used at `url`.
-    fn used(environment: &Environment, options: CredentialFiles, url: &str) -> [String; 4] {
+    fn used_files(environment: &Environment, options: CredentialFiles, url: &str) -> [String; 4] {
         let (files, _) = environment.files(options, &url.parse().unwrap());
         [files.ca, files.certificate, files.key, files.token]
             .map(|file| file.map_or("-".to_owned(), |file| file.display().to_string()))
@@ -234,15 +234,15 @@ mod tests {
     #[test]
     fn files_of_the_environment_count_where_no_option_names_one() {
         let none = CredentialFiles::default;
-        assert_eq!(used(&all(), none(), "https://a:1"), ["ca", "cert", "key", "token"]);
-        assert_eq!(used(&environment(&[(TLS_CA, "")]), none(), "https://a:1"), ["-"; 4]);
+        assert_eq!(used_files(&all(), none(), "https://a:1"), ["ca", "cert", "key", "token"]);
+        assert_eq!(used_files(&environment(&[(TLS_CA, "")]), none(), "https://a:1"), ["-"; 4]);
         let ca = CredentialFiles { ca: Some("mine".into()), ..none() };
-        assert_eq!(used(&all(), ca, "https://a:1"), ["mine", "cert", "key", "token"]);
+        assert_eq!(used_files(&all(), ca, "https://a:1"), ["mine", "cert", "key", "token"]);
         let token = CredentialFiles { token: Some("mine".into()), ..none() };
-        assert_eq!(used(&all(), token, "https://a:1"), ["ca", "cert", "key", "mine"]);
+        assert_eq!(used_files(&all(), token, "https://a:1"), ["ca", "cert", "key", "mine"]);
         // A certificate is never combined with a key from another source.
         let certificate = CredentialFiles { certificate: Some("mine".into()), ..none() };
-        assert_eq!(used(&all(), certificate, "https://a:1"), ["ca", "mine", "-", "token"]);
+        assert_eq!(used_files(&all(), certificate, "https://a:1"), ["ca", "mine", "-", "token"]);
     }
 
     #[test]
@@ -254,7 +254,7 @@ mod tests {
             // The token would be sent unencrypted to this address.
             ("http://node-1:1", ["-", "-", "-", "-"]),
         ] {
-            assert_eq!(used(&of_coordinator(Some(url)), none(), url), expected, "{url}");
+            assert_eq!(used_files(&environment_of(Some(url)), none(), url), expected, "{url}");
         }
     }
 
@@ -275,10 +275,14 @@ mod tests {
             (Some("unix:A"), "unix:a", ["-"; 4]),
             (Some("no address"), "https://a:1", ["-"; 4]),
         ] {
-            assert_eq!(used(&of_coordinator(named), none(), url), expected, "{named:?}: {url}");
+            assert_eq!(
+                used_files(&environment_of(named), none(), url),
+                expected,
+                "{named:?}: {url}"
+            );
         }
         let mine = CredentialFiles { ca: Some("mine".into()), ..none() };
-        assert_eq!(used(&all(), mine.clone(), "https://b:1"), ["mine", "-", "-", "-"]);
+        assert_eq!(used_files(&all(), mine.clone(), "https://b:1"), ["mine", "-", "-", "-"]);
         let unused = |options, url: &str| {
             let (_, unused) = all().files(options, &url.parse().unwrap());
             (!unused.is_empty()).then(|| unused.to_string())

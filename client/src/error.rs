@@ -45,7 +45,7 @@ pub enum ClientError {
         reason: String,
     },
     /// The coordinator rejects the specification.
-    #[error("{}", counted(.0))]
+    #[error("{}", violation_count(.0))]
     Violations(Violations),
     /// The coordinator refuses the request.
     #[error("{reason}{hint} (coordinator {endpoint})")]
@@ -117,7 +117,7 @@ impl ClientError {
     }
 }
 
-fn counted(violations: &Violations) -> String {
+fn violation_count(violations: &Violations) -> String {
     let lines: Vec<String> =
         violations.iter().map(|violation| format!("\n  {violation}")).collect();
     let errors = if lines.len() == 1 { "error" } else { "errors" };

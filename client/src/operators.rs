@@ -15,7 +15,7 @@ use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
 
-use crate::client::{Client, loaded};
+use crate::client::{Client, load_credentials};
 use crate::error::ClientError;
 use crate::listener::RunListener;
 use crate::peer::Peer;
@@ -25,33 +25,33 @@ impl Client {
     /// Returns the attached workers, and those that left last.
     pub async fn workers(&mut self) -> Result<ListWorkersResponse, ClientError> {
         let call = self.jobs.list_workers(v1::ListWorkersRequest {});
-        self.peer.answered(call).await
+        self.peer.wait_for_answer(call).await
     }
 
     /// Returns what decides how fast a job is.
     pub async fn explain(&mut self, job: &str) -> Result<ExplainResponse, ClientError> {
         let call = self.jobs.explain(v1::ExplainRequest { job: job.to_owned() });
-        self.peer.answered(call).await
+        self.peer.wait_for_answer(call).await
     }
 
     /// Lifts the ban of a host; returns the worker that had been found to compute wrongly.
     pub async fn unban(&mut self, host: &str) -> Result<v1::BannedWorker, ClientError> {
         let call = self.jobs.lift_ban(v1::LiftBanRequest { host: host.to_owned() });
-        let worker = self.peer.answered(call).await?.worker;
+        let worker = self.peer.wait_for_answer(call).await?.worker;
         self.present(worker, "worker")
     }
 
     /// Has an ended job computed again that a banned host contributed to; returns its state afterwards.
     pub async fn recheck(&mut self, job: &str) -> Result<JobSnapshot, ClientError> {
         let call = self.jobs.recheck(v1::RecheckRequest { job: job.to_owned() });
-        let snapshot = self.peer.answered(call).await?.snapshot;
+        let snapshot = self.peer.wait_for_answer(call).await?.snapshot;
         self.present(snapshot, "snapshot")
     }
 
     /// Drains a worker; returns its state afterwards.
     pub async fn drain(&mut self, worker: u64) -> Result<WorkerSnapshot, ClientError> {
         let call = self.jobs.drain_worker(v1::DrainWorkerRequest { worker });
-        let worker = self.peer.answered(call).await?.worker;
+        let worker = self.peer.wait_for_answer(call).await?.worker;
         self.present(worker, "worker")
     }
 
@@ -62,7 +62,7 @@ impl Client {
         mut take: impl FnMut(&[u8]) -> Result<(), E>,
     ) -> Result<Result<BackupEnd, ClientError>, E> {
         let call = self.jobs.backup(v1::BackupRequest {});
-        let mut stream = match self.peer.answered(call).await {
+        let mut stream = match self.peer.wait_for_answer(call).await {
             Ok(stream) => stream,
             Err(error) => return Ok(Err(error)),
         };
@@ -73,12 +73,14 @@ impl Client {
             };
             let part = match message {
                 Ok(message) => message.and_then(|message| message.part),
-                Err(status) => return Ok(Err(self.peer.refused(&status))),
+                Err(status) => return Ok(Err(self.peer.interpret_refusal(&status))),
             };
             match part {
                 Some(Part::Data(data)) => take(&data)?,
                 Some(Part::End(end)) => return Ok(Ok(end)),
-                None => return Ok(Err(self.malformed(Malformed::Missing { field: "part" }))),
+                None => {
+                    return Ok(Err(self.malformed_answer(Malformed::Missing { field: "part" })));
+                }
             }
         }
     }
@@ -95,9 +97,9 @@ pub async fn health(
     let files = CredentialFiles { token: None, ..files.clone() };
     let mut patience = Patience::new(limit);
     let connected = async {
-        let credentials = loaded(&files, endpoint).await?;
+        let credentials = load_credentials(&files, endpoint).await?;
         let connected = connection::connect_with(endpoint, &credentials, limit);
-        // The connection keeps the limit by itself; what it took is no longer left for the answer.
+        // The connection keeps the limit by itself. The time that it took is lost for the answer.
         let late =
             |_| ConnectError::Timeout { endpoint: endpoint.clone(), seconds: limit.as_secs_f64() };
         Ok(patience.wait_for(connected).await.map_err(late)??)
@@ -106,6 +108,6 @@ pub async fn health(
         connected.await.map_err(|error: ClientError| error.with_unused_variables(unused))?;
     let mut client = HealthClient::new(connection);
     let call = client.check(HealthCheckRequest::default());
-    let answer = Peer::new(remote, listener).answered_within(&mut patience, call).await?;
+    let answer = Peer::new(remote, listener).wait_for_answer_within(&mut patience, call).await?;
     Ok(answer.status() == ServingStatus::Serving)
 }

@@ -19,20 +19,20 @@ pub fn check(
         bail!(
             "the coordinator ({}) has computed another job than this program ({}) has submitted: it does \
              not know all of its keys; use the same version for both",
-            shown(there),
-            shown(here)
+            describe_program(there),
+            describe_program(here)
         );
     }
     Ok((here.numerics != there.numerics).then(|| {
         format!(
             "computed by {}; this program is {}, whose velocities may differ slightly",
-            shown(there),
-            shown(here)
+            describe_program(there),
+            describe_program(here)
         )
     }))
 }
 
-fn shown(program: &Program) -> String {
+fn describe_program(program: &Program) -> String {
     format!("osteon {}, numerics {}", program.version, program.numerics)
 }
 

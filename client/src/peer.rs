@@ -20,7 +20,6 @@ use crate::remote::{Remote, SILENCE_S_MAX, answer_limit};
 /// The coordinator that a client is connected to.
 #[derive(Debug, Clone)]
 pub(crate) struct Peer {
-    /// Its address.
     pub(crate) endpoint: Endpoint,
     /// Whether it has ever answered, which shows that client and coordinator use the same protocol.
     ever_answered: bool,
@@ -38,15 +37,15 @@ impl Peer {
     }
 
     /// Waits for the answer to `call`, for at most the client's time limit.
-    pub(crate) async fn answered<T>(
+    pub(crate) async fn wait_for_answer<T>(
         &mut self,
         call: impl Future<Output = Result<Response<T>, Status>>,
     ) -> Result<T, ClientError> {
-        self.answered_within(&mut Patience::new(answer_limit()), call).await
+        self.wait_for_answer_within(&mut Patience::new(answer_limit()), call).await
     }
 
     /// Waits for the answer to `call`, for as long as there is patience.
-    pub(crate) async fn answered_within<T>(
+    pub(crate) async fn wait_for_answer_within<T>(
         &mut self,
         patience: &mut Patience,
         call: impl Future<Output = Result<Response<T>, Status>>,
@@ -62,7 +61,7 @@ impl Peer {
                 self.ever_answered = true;
                 return Ok(response.into_inner());
             }
-            Ok(Err(status)) => self.unanswered(&status),
+            Ok(Err(status)) => self.interpret_unanswered(&status),
             Err(_) => self.silent(),
         };
         // A refusal counts as an answer, too.
@@ -81,8 +80,8 @@ impl Peer {
     }
 
     /// Interprets the status of a call that ended before its first answer.
-    fn unanswered(&self, status: &Status) -> ClientError {
-        match self.refused(status) {
+    fn interpret_unanswered(&self, status: &Status) -> ClientError {
+        match self.interpret_refusal(status) {
             ClientError::Lost { endpoint, .. } => {
                 let reason = endpoint.explained(status, self.ever_answered);
                 ClientError::Lost { endpoint, reason }
@@ -92,7 +91,7 @@ impl Peer {
     }
 
     /// Interprets the status of a failed call.
-    pub(crate) fn refused(&self, status: &Status) -> ClientError {
+    pub(crate) fn interpret_refusal(&self, status: &Status) -> ClientError {
         if let Some(violations) = status::violations(status) {
             return ClientError::Violations(violations);
         }

@@ -73,7 +73,7 @@ impl ResultsDirectory {
         }
         let result = read_named_file(&path.join(RESULT))?;
         match read_named_file(&job)? {
-            Some(stored) => same_job(&job, &stored, specification)?,
+            Some(stored) => check_same_job(&job, &stored, specification)?,
             None if result.is_some() && !path.join(CASE).exists() => {
                 return Err(RunError::bad_input(anyhow!(
                     "{} has a {RESULT} but no {JOB}: its job is unknown; \
@@ -299,7 +299,11 @@ pub fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpecificatio
 }
 
 /// Refuses a directory whose job is not `specification`, and reports the first difference.
-fn same_job(path: &Path, stored: &str, specification: &JobSpecification) -> Result<(), RunError> {
+fn check_same_job(
+    path: &Path,
+    stored: &str,
+    specification: &JobSpecification,
+) -> Result<(), RunError> {
     // The comparison ignores formatting, and defaults that are left out.
     let directory = path.parent().unwrap_or(Path::new(""));
     // Only the job of an identification has data.

@@ -135,7 +135,7 @@ pub enum AccessDenied {
 
 /// Returns the requirement of the method at `path`. A method that is not listed has the strictest
 /// one.
-pub fn need(path: &str) -> Requirement {
+pub fn requirement(path: &str) -> Requirement {
     let Some((service, method)) = path.strip_prefix('/').and_then(|path| path.split_once('/'))
     else {
         return Requirement::Known;
@@ -155,17 +155,17 @@ pub fn need(path: &str) -> Requirement {
 }
 
 /// Returns the requirement of a path of the live page: that of the method which gives or does the same.
-pub fn page_need(path: &str) -> Requirement {
+pub fn page_requirement(path: &str) -> Requirement {
     match path {
         // The page itself is the same for everybody, and says nothing of any job.
         "/" | "/page.css" | "/page.js" | "/charts.js" | "/icon.svg" => Requirement::Nothing,
-        "/data/jobs" => need("/osteon.v1.Jobs/List"),
-        "/data/overview" => need("/osteon.v1.Jobs/ListWorkers"),
-        "/events" => need("/osteon.v1.Jobs/Watch"),
+        "/data/jobs" => requirement("/osteon.v1.Jobs/List"),
+        "/data/overview" => requirement("/osteon.v1.Jobs/ListWorkers"),
+        "/events" => requirement("/osteon.v1.Jobs/Watch"),
         path if path.starts_with("/data/jobs/") && path.ends_with("/cancel") => {
-            need("/osteon.v1.Jobs/Cancel")
+            requirement("/osteon.v1.Jobs/Cancel")
         }
-        path if path.starts_with("/data/jobs/") => need("/osteon.v1.Jobs/Explain"),
+        path if path.starts_with("/data/jobs/") => requirement("/osteon.v1.Jobs/Explain"),
         _ => Requirement::Known,
     }
 }

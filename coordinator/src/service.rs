@@ -13,6 +13,7 @@ pub(crate) mod jobs;
 pub mod listen;
 pub(crate) mod meter;
 pub mod metrics_listener;
+pub(crate) mod no_answer;
 pub(crate) mod observers;
 pub mod open_files;
 pub(crate) mod outbound;

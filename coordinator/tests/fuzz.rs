@@ -53,7 +53,7 @@ fn check_header(bytes: &[u8]) {
 }
 
 fn check_path(path: &str) {
-    let open = bounded(path.len(), || access::need(path)) == Requirement::Nothing;
+    let open = bounded(path.len(), || access::requirement(path)) == Requirement::Nothing;
     assert_eq!(open, path.starts_with("/grpc.health.v1.Health/"), "{path}");
 }
 

@@ -176,11 +176,11 @@ fn insert(bytes: &mut Vec<u8>, at: usize, inserted: &[u8]) {
 
 /// Returns the positions of words and numbers.
 fn words(bytes: &[u8]) -> Vec<Range<usize>> {
-    let of_word = |byte: u8| byte.is_ascii_alphanumeric() || b"_+-.".contains(&byte);
+    let is_of_word = |byte: u8| byte.is_ascii_alphanumeric() || b"_+-.".contains(&byte);
     let mut words = Vec::new();
     let mut start = None;
     for (at, &byte) in bytes.iter().chain([&b' ']).enumerate() {
-        match (start, of_word(byte)) {
+        match (start, is_of_word(byte)) {
             (None, true) => start = Some(at),
             (Some(from), false) => {
                 words.push(from..at);

@@ -190,7 +190,6 @@ mod tests {
 
     use super::*;
 
-    /// Returns the cases of a seed.
     fn cases_of(seed: u64, cases: u32) -> Vec<u64> {
         let made = RefCell::new(Vec::new());
         check_with(seed, &here!(), cases, any::<u64>(), |case| {

@@ -1,10 +1,10 @@
-//! What other pages have a user's browser send. A browser carries out the requests of every page that it shows, to any
-//! address that it reaches, so a server on the user's own machine must know its own page's requests from
-//! those: by the host that they name, and by where the browser says that they come from. Programs say
-//! nothing of the kind.
+//! Tells requests that other pages have a user's browser send from those of the page itself. A browser carries out the
+//! requests of every page that it shows, to any address that it reaches, also on the user's own machine. Two things
+//! tell: the host that a request names, and where the browser says that it comes from. Programs say nothing of the
+//! kind.
 //!
-//! The type of the content is no criterion: pages may send some types and not others without asking first, but
-//! programs send those types, too.
+//! The type of the content does not tell: pages may send only some types without asking first, but programs send
+//! those, too.
 
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 pub struct OwnHosts(Arc<Vec<String>>);
 
 impl OwnHosts {
-    /// Returns those of this machine, which may have a name, with `further` ones.
+    /// Returns the hosts `further` together with those of this machine, which may have a name.
     pub fn new(machine: Option<String>, mut further: Vec<String>) -> Self {
         further.push("localhost".to_owned());
         further.extend(machine);
@@ -28,7 +28,7 @@ impl OwnHosts {
     }
 
     /// Returns whether a host is an address, or a name that leads nowhere else. Any other name may belong
-    /// to somebody who lets it lead to this machine, so that browsers take his page for this one's.
+    /// to somebody who lets it lead to this machine, so that browsers take that page for this machine's.
     pub fn contain(&self, host: &str) -> bool {
         let name = without_port(host);
         let address =
@@ -58,7 +58,6 @@ pub fn is_cross_site(headers: &HeaderMap, method: &Method, host: &str) -> bool {
     }
 }
 
-/// Returns a host without its port.
 fn without_port(host: &str) -> &str {
     match host.rsplit_once(':') {
         // The colons of an address are in brackets.

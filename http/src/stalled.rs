@@ -27,7 +27,7 @@ impl<C> ReadPeer<C> {
     }
 
     /// Limits the time of an operation that has to wait for the peer.
-    fn within<T>(
+    fn limit_wait<T>(
         &mut self,
         cx: &mut Context<'_>,
         polled: Poll<io::Result<T>>,
@@ -58,17 +58,17 @@ impl<C: AsyncWrite + Unpin> AsyncWrite for ReadPeer<C> {
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.connection).poll_write(cx, bytes);
-        self.within(cx, written)
+        self.limit_wait(cx, written)
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let flushed = Pin::new(&mut self.connection).poll_flush(cx);
-        self.within(cx, flushed)
+        self.limit_wait(cx, flushed)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let shut = Pin::new(&mut self.connection).poll_shutdown(cx);
-        self.within(cx, shut)
+        self.limit_wait(cx, shut)
     }
 }
 

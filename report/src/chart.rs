@@ -49,8 +49,8 @@ impl Chart {
         self.layers.push(ChartLayer { name: name.into(), ink, shape });
     }
 
-    /// Returns the numbers of all layers: `x` to `x_end` and `y` to `y_end`, the ends empty where there
-    /// is one value only.
+    /// Returns the numbers of all layers as CSV: `x` to `x_end` and `y` to `y_end`. An end is empty if there
+    /// is only one value.
     pub(crate) fn csv(&self) -> String {
         let mut out = "series,label,x,x_end,y,y_end\n".to_owned();
         for layer in &self.layers {
@@ -70,15 +70,15 @@ impl Chart {
         out
     }
 
-    /// Name of the category at a place, if an axis has categories.
+    /// Name of the category at a place, empty if no axis has categories.
     fn category(&self, y: f64, x: f64) -> &str {
-        let of = |axis: &'_ Axis, value: f64| -> Option<usize> {
+        let index = |axis: &Axis, value: f64| -> Option<usize> {
             let place = value.round();
             (!axis.categories.is_empty() && place >= 0.0).then_some(place as usize)
         };
-        let y_place = of(&self.y, y).and_then(|place| self.y.categories.get(place));
-        let x_place = of(&self.x, x).and_then(|place| self.x.categories.get(place));
-        y_place.or(x_place).map_or("", String::as_str)
+        let on_y = index(&self.y, y).and_then(|place| self.y.categories.get(place));
+        let on_x = index(&self.x, x).and_then(|place| self.x.categories.get(place));
+        on_y.or(on_x).map_or("", String::as_str)
     }
 }
 
@@ -108,13 +108,13 @@ impl Axis {
     }
 
     /// An axis with a place for each name.
-    pub(crate) fn of_categories(label: impl Into<String>, names: Vec<String>) -> Self {
+    pub(crate) fn with_categories(label: impl Into<String>, names: Vec<String>) -> Self {
         let range = Some([-0.5, names.len().max(1) as f64 - 0.5]);
         Self { range, categories: names, ..Self::linear(label) }
     }
 
     /// The same axis with these ends.
-    pub(crate) fn spanning(self, low: f64, high: f64) -> Self {
+    pub(crate) fn with_ends(self, low: f64, high: f64) -> Self {
         Self { range: Some([low, high]), ..self }
     }
 }
@@ -181,19 +181,24 @@ impl Shape {
     /// Returns x, end of x, y and end of y of each element, NaN where there is none, and its text.
     fn numbers(&self) -> Vec<([f64; 4], &str)> {
         const NONE: f64 = f64::NAN;
-        let plain = |numbers: Vec<[f64; 4]>| numbers.into_iter().map(|one| (one, "")).collect();
+        let without_text =
+            |numbers: Vec<[f64; 4]>| numbers.into_iter().map(|one| (one, "")).collect();
         match self {
             Self::Line(points) | Self::Points(points) | Self::Dots(points) => {
-                plain(points.iter().map(|&[x, y]| [x, NONE, y, NONE]).collect())
+                without_text(points.iter().map(|&[x, y]| [x, NONE, y, NONE]).collect())
             }
-            Self::Band(band) => plain(band.iter().map(|&[x, a, b]| [x, NONE, a, b]).collect()),
-            Self::Bars(bars) => plain(bars.iter().map(|&[a, b, y]| [a, b, y, NONE]).collect()),
+            Self::Band(band) => {
+                without_text(band.iter().map(|&[x, a, b]| [x, NONE, a, b]).collect())
+            }
+            Self::Bars(bars) => {
+                without_text(bars.iter().map(|&[a, b, y]| [a, b, y, NONE]).collect())
+            }
             Self::Intervals(intervals) => {
-                plain(intervals.iter().map(|&[a, b, y]| [a, b, y, NONE]).collect())
+                without_text(intervals.iter().map(|&[a, b, y]| [a, b, y, NONE]).collect())
             }
-            Self::Level(y) => plain(vec![[NONE, NONE, *y, NONE]]),
-            Self::Upright(x) => plain(vec![[*x, NONE, NONE, NONE]]),
-            Self::Rectangles(all) => plain(all.clone()),
+            Self::Level(y) => without_text(vec![[NONE, NONE, *y, NONE]]),
+            Self::Upright(x) => without_text(vec![[*x, NONE, NONE, NONE]]),
+            Self::Rectangles(all) => without_text(all.clone()),
             Self::Texts(texts) => {
                 texts.iter().map(|([x, y], text)| ([*x, NONE, *y, NONE], text.as_str())).collect()
             }
@@ -204,8 +209,8 @@ impl Shape {
     fn extent(&self) -> [Vec<f64>; 2] {
         let numbers = self.numbers();
         let along = |places: [usize; 2]| {
-            let of = |(one, _): &([f64; 4], &str)| places.map(|place| one[place]);
-            numbers.iter().flat_map(of).filter(|value| value.is_finite()).collect()
+            let values = |(one, _): &([f64; 4], &str)| places.map(|place| one[place]);
+            numbers.iter().flat_map(values).filter(|value| value.is_finite()).collect()
         };
         let mut y: Vec<f64> = along([2, 3]);
         if matches!(self, Self::Bars(_)) {
@@ -245,7 +250,7 @@ mod tests {
     #[test]
     fn categories_are_named_in_the_table() {
         let names = vec!["a".to_owned(), "b, c".to_owned()];
-        let y = Axis::of_categories("group", names);
+        let y = Axis::with_categories("group", names);
         let mut chart = Chart::new("a", "A", Axis::linear("x"), y);
         chart.layer("95 %", Ink::First, Shape::Intervals(vec![[1.0, 2.0, 1.0]]));
         assert!(chart.csv().ends_with("95 %,\"b, c\",1.0,2.0,1.0,\n"), "{}", chart.csv());

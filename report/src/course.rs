@@ -21,7 +21,6 @@ pub struct SearchCourse {
     pub(crate) suffix: String,
     /// The evaluations, in order.
     pub(crate) rows: Vec<CourseRow>,
-    /// The free parameters.
     pub(crate) free: Vec<Parameter>,
     /// Moments of the data.
     pub(crate) measured: Moments,
@@ -52,7 +51,7 @@ pub(crate) struct CourseRow {
 
 impl SearchCourse {
     /// The course of a search that is followed from its beginning.
-    pub fn of_job(specification: &JobSpecification, set: usize) -> Self {
+    pub fn for_job(specification: &JobSpecification, set: usize) -> Self {
         let free = specification.ranges_of(set);
         let free = Parameter::ALL.into_iter().zip(free);
         let (free, ranges) = free.filter(|(_, range)| matches!(range, Range::Free { .. })).unzip();
@@ -100,7 +99,7 @@ impl SearchCourse {
     }
 
     /// The course of a search whose files are read; `None` where its history is not known.
-    pub(crate) fn of_finding(finding: &Finding<'_>) -> Option<Self> {
+    pub(crate) fn from_finding(finding: &Finding<'_>) -> Option<Self> {
         let table = finding.context.history.as_ref()?;
         let groups = table.texts("group");
         let belongs = |place: &usize| match (&groups, finding.group) {
@@ -114,8 +113,8 @@ impl SearchCourse {
         };
         let (numbers, costs) = (column("evaluation"), column("cost"));
         let moments = ["mean", "coefficient_of_variation"].map(column);
-        let known = |parameter: &Parameter| Some((*parameter, column(parameter.name())?));
-        let free: Vec<_> = finding.free().iter().filter_map(known).collect();
+        let named_column = |parameter: &Parameter| Some((*parameter, column(parameter.name())?));
+        let free: Vec<_> = finding.free_parameters().iter().filter_map(named_column).collect();
         let within = |parameter: Parameter, value: f64| {
             finding.range(parameter).coordinate(value).unwrap_or(f64::NAN)
         };

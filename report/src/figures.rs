@@ -19,20 +19,19 @@ use crate::finding::Finding;
 pub(crate) use comparison::overlay;
 pub(crate) use figure::Figure;
 pub(crate) use groups::forest;
-pub(crate) use setup::of_setup;
-pub(crate) use traces::of_traces;
+pub(crate) use setup::setup_figure;
+pub(crate) use traces::trace_figures;
 
 /// Figures under a heading.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FigureSection {
-    /// The heading.
     pub(crate) heading: String,
     /// The figures; a section without any is left out.
     pub(crate) figures: Vec<Figure>,
 }
 
 /// Returns the sections on what was found from one set of data.
-pub(crate) fn of_finding(finding: &Finding<'_>) -> Vec<FigureSection> {
+pub(crate) fn finding_sections(finding: &Finding<'_>) -> Vec<FigureSection> {
     let suffix = finding.suffix();
     let section = |heading: &str, figures| {
         let heading = format!("{heading}{suffix}");

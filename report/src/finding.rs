@@ -32,15 +32,12 @@ pub(crate) struct Finding<'a> {
     pub(crate) reason: Option<&'a str>,
     /// Cost of the best point.
     pub(crate) cost: Option<f64>,
-    /// The mean model.
     pub(crate) parameters: &'a MeanModel,
-    /// The dispersion.
     pub(crate) dispersion: Option<f64>,
     /// Moments of the model.
     pub(crate) velocity: &'a Velocity,
     /// Other observables of the model that were measured.
     pub(crate) observables: ObservableEstimates,
-    /// The data.
     pub(crate) data: Option<&'a Data>,
     /// Failed realizations by kind.
     pub(crate) failures: &'a BTreeMap<FailureKind, u64>,
@@ -50,9 +47,7 @@ pub(crate) struct Finding<'a> {
     pub(crate) profiles: Option<&'a BTreeMap<Parameter, ParameterProfile>>,
     /// The solutions from several starts.
     pub(crate) solutions: Option<&'a Solutions>,
-    /// The posterior.
     pub(crate) posterior: Option<&'a PosteriorReport>,
-    /// Number of realizations.
     pub(crate) realizations: u64,
     /// First evaluation below the sampling noise.
     pub(crate) below_noise_from: Option<u64>,
@@ -68,18 +63,18 @@ pub(crate) struct Finding<'a> {
 
 impl<'a> Finding<'a> {
     /// Returns the findings of an identification: one, or one for each group.
-    pub(crate) fn of_identification(
+    pub(crate) fn from_identification(
         result: &'a Identification,
         context: &'a JobContext,
     ) -> Vec<Self> {
         let Some(groups) = &result.groups else {
-            return vec![Self::of_whole(result, context)];
+            return vec![Self::from_whole(result, context)];
         };
-        let finding = |(set, group)| Self::of_group(set, group, result, context);
+        let finding = |(set, group)| Self::from_group(set, group, result, context);
         groups.iter().enumerate().map(finding).collect()
     }
 
-    fn of_whole(result: &'a Identification, context: &'a JobContext) -> Self {
+    fn from_whole(result: &'a Identification, context: &'a JobContext) -> Self {
         Self {
             group: None,
             set: 0,
@@ -100,13 +95,13 @@ impl<'a> Finding<'a> {
             realizations: result.realizations,
             below_noise_from: result.search.below_noise_from,
             solver: Some(&result.solver),
-            measured: measured(context, 0),
+            measured: measured_sample(context, 0),
             model: model(context, None),
             context,
         }
     }
 
-    fn of_group(
+    fn from_group(
         set: usize,
         group: &'a Group,
         result: &'a Identification,
@@ -132,14 +127,14 @@ impl<'a> Finding<'a> {
             realizations: result.realizations,
             below_noise_from: None,
             solver: None,
-            measured: measured(context, set),
+            measured: measured_sample(context, set),
             model: model(context, Some(&group.name)),
             context,
         }
     }
 
     /// Returns the finding of a propagation.
-    pub(crate) fn of_propagation(result: &'a Propagation, context: &'a JobContext) -> Self {
+    pub(crate) fn from_propagation(result: &'a Propagation, context: &'a JobContext) -> Self {
         Self {
             group: None,
             set: 0,
@@ -166,7 +161,6 @@ impl<'a> Finding<'a> {
         }
     }
 
-    /// The job.
     pub(crate) fn specification(&self) -> &JobSpecification {
         &self.context.specification
     }
@@ -177,8 +171,7 @@ impl<'a> Finding<'a> {
         ranges.get(parameter as usize).copied().unwrap_or(Range::AS_IN_SETUP)
     }
 
-    /// Returns the free parameters.
-    pub(crate) fn free(&self) -> Vec<Parameter> {
+    pub(crate) fn free_parameters(&self) -> Vec<Parameter> {
         let free = |parameter: &Parameter| matches!(self.range(*parameter), Range::Free { .. });
         Parameter::ALL.into_iter().filter(free).collect()
     }
@@ -193,7 +186,7 @@ impl<'a> Finding<'a> {
     }
 
     /// Number of failed realizations at the best point.
-    pub(crate) fn failed(&self) -> u64 {
+    pub(crate) fn failed_realizations(&self) -> u64 {
         self.failures.values().sum()
     }
 
@@ -234,7 +227,7 @@ impl<'a> Finding<'a> {
     }
 }
 
-fn measured(context: &JobContext, set: usize) -> Option<VelocitySample> {
+fn measured_sample(context: &JobContext, set: usize) -> Option<VelocitySample> {
     let data = context.specification.data.as_ref()?;
     VelocitySample::new(data.velocities(set)?.to_vec())
 }

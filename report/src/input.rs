@@ -30,7 +30,6 @@ pub(crate) enum RunContent {
 /// The job of a result, and its tables.
 #[derive(Debug)]
 pub(crate) struct JobContext {
-    /// The job.
     pub(crate) specification: Box<JobSpecification>,
     /// `history.csv`.
     pub(crate) history: Option<NumberTable>,
@@ -45,7 +44,6 @@ pub(crate) struct JobContext {
 /// The case of a simulation, and its traces.
 #[derive(Debug)]
 pub(crate) struct SimulationContext {
-    /// The case.
     pub(crate) case: Case,
     /// Times, s, and for each receiver its pressures, Pa.
     pub(crate) traces: Option<(Vec<f64>, Vec<Vec<f64>>)>,
@@ -78,7 +76,6 @@ pub(crate) struct RealizationRows {
 /// One part of the realizations: those of a group, or all.
 #[derive(Debug, Default)]
 pub(crate) struct ModelOutcomes {
-    /// The velocities.
     pub(crate) velocities: Option<VelocitySample>,
     /// Index and kind of each failure.
     pub(crate) failures: Vec<(f64, String)>,
@@ -99,10 +96,10 @@ impl RealizationRows {
 
     /// Returns the realizations of a group, or all of a run without groups.
     pub(crate) fn outcomes_of_group(&self, group: Option<&str>) -> ModelOutcomes {
-        let of_group = |place: &usize| {
+        let is_of_group = |place: &usize| {
             group.is_none_or(|name| self.groups.get(*place).is_some_and(|one| one == name))
         };
-        let places: Vec<usize> = (0..self.velocities.len()).filter(of_group).collect();
+        let places: Vec<usize> = (0..self.velocities.len()).filter(is_of_group).collect();
         let failures = places.iter().enumerate().filter_map(|(index, place)| {
             let kind = self.failures.get(*place)?;
             (!kind.is_empty()).then(|| (index as f64, kind.clone()))

@@ -5,8 +5,8 @@ use osteon_common::outcome::FailureCounts;
 use crate::chart::STYLE;
 use crate::course::SearchCourse;
 use crate::figures::Figure;
-use crate::figures::convergence::of_course;
-use crate::figures::failures::{FailedRealizations, by_kind};
+use crate::figures::convergence::course_figures;
+use crate::figures::failures::{FailedRealizations, failures_by_kind};
 use crate::page;
 
 /// Style sheets of figures, and of a page.
@@ -37,7 +37,7 @@ impl From<Figure> for LiveFigure {
 /// Returns the figures of a search: cost, both moments, and parameters; none before its second
 /// evaluation.
 pub fn search_figures(course: &SearchCourse) -> Vec<LiveFigure> {
-    of_course(course).into_iter().map(LiveFigure::from).collect()
+    course_figures(course).into_iter().map(LiveFigure::from).collect()
 }
 
 /// Returns the figure of the failures in an evaluation; `None` if no realization failed.
@@ -45,7 +45,7 @@ pub fn failure_figure(failures: &FailureCounts, realizations: u64) -> Option<Liv
     let kinds: Vec<_> = failures.iter().collect();
     let suffix = " in the last evaluation".to_owned();
     let all = FailedRealizations { kinds, realizations, prefix: String::new(), suffix };
-    (failures.total() > 0).then(|| by_kind(&all).into())
+    (failures.total() > 0).then(|| failures_by_kind(&all).into())
 }
 
 #[cfg(test)]

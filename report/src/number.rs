@@ -47,7 +47,7 @@ pub(crate) fn digits(value: f64, digits: i32) -> String {
 }
 
 /// Returns a given number with at most six significant digits, without zeros at its end.
-pub(crate) fn given(value: f64) -> String {
+pub(crate) fn format_given(value: f64) -> String {
     let text = digits(value, 6);
     if text.contains('.') && !text.contains('·') {
         return text.trim_end_matches('0').trim_end_matches('.').to_owned();
@@ -90,14 +90,14 @@ fn scientific(text: &str) -> String {
 }
 
 fn superscript(power: &str) -> String {
-    let raised = |c: char| match c {
+    let superscript_of = |c: char| match c {
         '-' => '⁻',
         '1' => '¹',
         '2' => '²',
         '3' => '³',
         digit => digit.to_digit(10).and_then(|d| char::from_u32(0x2070 + d)).unwrap_or(digit),
     };
-    power.chars().map(raised).collect()
+    power.chars().map(superscript_of).collect()
 }
 
 fn without_negative_zero(text: &str) -> String {
@@ -147,7 +147,7 @@ mod tests {
             assert_eq!(digits(value, count), expected, "{value}, {count}");
         }
         for (value, expected) in [(12.0, "12"), (0.3816, "0.3816"), (1500.0, "1500"), (0.0, "0")] {
-            assert_eq!(given(value), expected);
+            assert_eq!(format_given(value), expected);
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::finding::Finding;
 use crate::input::{ReportedRun, RunContent};
 use crate::page::markup::Numbers;
 use crate::sample::VelocitySample;
-use crate::text::escaped;
+use crate::text::escape;
 
 pub(crate) const PAGE_STYLE: &str = include_str!("page/page.css");
 /// The mark by which a page is known as that of a report.
@@ -31,13 +31,13 @@ pub fn files_of(page: &str) -> Option<Vec<String>> {
     if !page.contains(GENERATOR) {
         return None;
     }
-    let plain = |name: &&str| {
+    let is_plain = |name: &&str| {
         let (stem, ending) = name.rsplit_once('.').unwrap_or_default();
         let letters = |c: char| c.is_ascii_alphanumeric() || c == '-';
         !stem.is_empty() && stem.chars().all(letters) && ["svg", "csv"].contains(&ending)
     };
     let codes = page.split("<code>").skip(1).filter_map(|rest| rest.split("</code>").next());
-    Some(codes.filter(plain).map(str::to_owned).collect())
+    Some(codes.filter(is_plain).map(str::to_owned).collect())
 }
 
 /// A report.
@@ -69,7 +69,7 @@ struct PageSection {
 pub fn report(runs: &[ReportedRun]) -> Report {
     let several = runs.len() > 1;
     let (mut sections, mut charts) = (Vec::new(), Vec::new());
-    let findings: Vec<Vec<Finding<'_>>> = runs.iter().map(of_run).collect();
+    let findings: Vec<Vec<Finding<'_>>> = runs.iter().map(run_findings).collect();
     if several {
         sections.push(comparison(runs, &findings, &mut charts));
     }
@@ -87,10 +87,14 @@ pub fn report(runs: &[ReportedRun]) -> Report {
     Report { html: page(&names.join(", "), &sections), figures: charts }
 }
 
-fn of_run(run: &ReportedRun) -> Vec<Finding<'_>> {
+fn run_findings(run: &ReportedRun) -> Vec<Finding<'_>> {
     match &run.content {
-        RunContent::Identification(result, context) => Finding::of_identification(result, context),
-        RunContent::Propagation(result, context) => vec![Finding::of_propagation(result, context)],
+        RunContent::Identification(result, context) => {
+            Finding::from_identification(result, context)
+        }
+        RunContent::Propagation(result, context) => {
+            vec![Finding::from_propagation(result, context)]
+        }
         RunContent::Simulation(..) => Vec::new(),
     }
 }
@@ -105,16 +109,16 @@ fn run_sections(
     charts: &mut Vec<ReportText>,
     several: bool,
 ) {
-    let numbers = Numbers::of_run(number);
-    sections.push(section("In short", trust::of_run(run, findings)));
+    let numbers = Numbers::for_run(number);
+    sections.push(section("In short", trust::trust_list(run, findings)));
     let mut figures = Vec::new();
     match &run.content {
         RunContent::Simulation(result, context) => {
             sections.push(section("Results", simulation::table(&numbers, result)));
-            let traces = figures::of_traces(result, context);
+            let traces = figures::trace_figures(result, context);
             figures
                 .push(FigureSection { heading: "Pressures and times".to_owned(), figures: traces });
-            figures.push(set_up(&context.case.setup));
+            figures.push(setup_section(&context.case.setup));
         }
         RunContent::Identification(_, context) | RunContent::Propagation(_, context) => {
             let grouped = findings.iter().any(|finding| finding.group.is_some());
@@ -132,19 +136,19 @@ fn run_sections(
                     None => "Results".to_owned(),
                 };
                 sections.push(section(&heading, results::tables(&numbers, finding)));
-                figures.extend(figures::of_finding(finding));
+                figures.extend(figures::finding_sections(finding));
             }
-            figures.push(set_up(&context.specification.setup));
+            figures.push(setup_section(&context.specification.setup));
         }
     }
     if !several {
-        sections.extend(figures.into_iter().filter_map(|one| drawn(one, charts)));
+        sections.extend(figures.into_iter().filter_map(|one| draw_section(one, charts)));
     }
-    sections.push(section("Provenance", provenance::of_run(run)));
+    sections.push(section("Provenance", provenance::origin_table(run)));
 }
 
-fn set_up(setup: &osteon_common::case::Setup) -> FigureSection {
-    FigureSection { heading: "Set-up".to_owned(), figures: vec![figures::of_setup(setup)] }
+fn setup_section(setup: &osteon_common::case::Setup) -> FigureSection {
+    FigureSection { heading: "Set-up".to_owned(), figures: vec![figures::setup_figure(setup)] }
 }
 
 /// Returns the comparison of several runs: their velocities in one figure, and their differences.
@@ -170,7 +174,7 @@ fn comparison(
     let mut body = difference::table(&all, runs);
     let heading = "Comparison".to_owned();
     let figures = FigureSection { heading: heading.clone(), figures: figures::overlay(&samples) };
-    if let Some(drawn) = drawn(figures, charts) {
+    if let Some(drawn) = draw_section(figures, charts) {
         body.push_str(&drawn.body);
     }
     PageSection { heading, body }
@@ -181,7 +185,7 @@ fn section(heading: &str, body: String) -> PageSection {
 }
 
 /// Returns a section of figures, and adds their files; `None` if there is no figure.
-fn drawn(section: FigureSection, files: &mut Vec<ReportText>) -> Option<PageSection> {
+fn draw_section(section: FigureSection, files: &mut Vec<ReportText>) -> Option<PageSection> {
     let FigureSection { heading, figures } = section;
     if figures.is_empty() {
         return None;
@@ -193,9 +197,9 @@ fn drawn(section: FigureSection, files: &mut Vec<ReportText>) -> Option<PageSect
             body,
             "<figure><h3>{}</h3>{}<figcaption>{} <span class=\"files\">Files: \
              <code>{name}.svg</code>, <code>{name}.csv</code></span></figcaption></figure>",
-            escaped(&chart.title),
+            escape(&chart.title),
             chart.svg(),
-            escaped(reading),
+            escape(reading),
         );
         files.push(ReportText { name: format!("{name}.svg"), text: chart.svg_file() });
         files.push(ReportText { name: format!("{name}.csv"), text: chart.csv() });
@@ -207,14 +211,14 @@ fn drawn(section: FigureSection, files: &mut Vec<ReportText>) -> Option<PageSect
 fn page(title: &str, sections: &[PageSection]) -> String {
     let (mut contents, mut body) = (String::new(), String::new());
     for (place, PageSection { heading, body: text }) in sections.iter().enumerate() {
-        let heading = escaped(heading);
+        let heading = escape(heading);
         let _infallible = write!(contents, "<li><a href=\"#s{place}\">{heading}</a></li>");
         let _infallible = writeln!(
             body,
             "<section aria-labelledby=\"s{place}\"><h2 id=\"s{place}\">{heading}</h2>{text}</section>"
         );
     }
-    let title = escaped(title);
+    let title = escape(title);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\

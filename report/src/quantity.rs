@@ -54,12 +54,12 @@ impl Unit {
             Precision::Unknown => number::digits(value, DIGITS),
             Precision::Free => number::digits(value, FREE_DIGITS),
             Precision::Digits(digits) => number::digits(value, digits),
-            Precision::Given => number::given(value),
+            Precision::Given => number::format_given(value),
         }
     }
 
     /// Returns a name with this unit in brackets, for an axis.
-    pub(crate) fn after(&self, name: &str) -> String {
+    pub(crate) fn axis_label(&self, name: &str) -> String {
         if self.name.is_empty() { name.to_owned() } else { format!("{name} ({})", self.name) }
     }
 }

@@ -27,7 +27,6 @@ impl VelocitySample {
         (!sorted.is_empty()).then_some(Self { in_order, sorted })
     }
 
-    /// Number of velocities.
     pub(crate) fn len(&self) -> usize {
         self.sorted.len()
     }
@@ -154,7 +153,7 @@ impl VelocitySample {
 
     /// Returns mean and coefficient of variation of the first n velocities with their standard errors,
     /// as if they were independent, for about `steps` values of n with equal ratios.
-    pub(crate) fn running(&self, steps: u32) -> Vec<Running> {
+    pub(crate) fn running_moments(&self, steps: u32) -> Vec<Running> {
         let Some(first) = self.in_order.first() else { return Vec::new() };
         let (mut sums, mut found, mut next) = (PowerSums::new(*first), Vec::new(), 2.0);
         let ratio = libm::pow(self.len() as f64 / 2.0, 1.0 / f64::from(steps.max(1)));
@@ -162,7 +161,7 @@ impl VelocitySample {
             sums.add(*velocity);
             let count = (place + 1) as f64;
             if count >= 2.0 && (count >= next || place + 1 == self.len()) {
-                found.push(sums.running());
+                found.push(sums.moments_so_far());
                 while next <= count {
                     next = (next * ratio).max(next + 1.0).round();
                 }
@@ -175,7 +174,6 @@ impl VelocitySample {
 /// Moments of the first velocities of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Running {
-    /// Number of velocities.
     pub(crate) count: f64,
     /// Mean and its standard error, m/s.
     pub(crate) mean: [f64; 2],
@@ -213,7 +211,7 @@ impl PowerSums {
 
     /// The error of the coefficient of variation is that of the first order, from the third and fourth
     /// central moments.
-    fn running(&self) -> Running {
+    fn moments_so_far(&self) -> Running {
         let n = self.count;
         let [a, b, c, d] = self.sums.map(|sum| sum / n);
         let (second, mean) = (b - a * a, self.origin + a);
@@ -283,7 +281,7 @@ mod tests {
 
     #[test]
     fn running_moments_end_with_those_of_all() {
-        let running = sample(&[1.0, 2.0, 3.0, 6.0]).running(50);
+        let running = sample(&[1.0, 2.0, 3.0, 6.0]).running_moments(50);
         let last = running[running.len() - 1];
         assert_eq!((last.count, last.mean[0]), (4.0, 3.0));
         // Variance 14/3 with three degrees of freedom.
@@ -297,7 +295,7 @@ mod tests {
         let sample = sample(&[4000.0; 7]);
         assert!(sample.bandwidth() > 0.0 && sample.histogram().is_empty());
         assert!(sample.density().iter().all(|[_, height]| height.is_finite()));
-        assert_eq!(sample.running(10)[0].variation, [0.0, 0.0]);
+        assert_eq!(sample.running_moments(10)[0].variation, [0.0, 0.0]);
         assert_eq!(VelocitySample::new(vec![f64::NAN]), None);
     }
 }

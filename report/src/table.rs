@@ -39,7 +39,6 @@ impl NumberTable {
         Ok(Self { names, rows })
     }
 
-    /// Number of rows.
     pub(crate) fn len(&self) -> usize {
         self.rows.len()
     }
@@ -88,21 +87,21 @@ fn fields(line: &str) -> Vec<String> {
                 quoted = !quoted;
                 was_quoted = true;
             }
-            ',' if !quoted => found.push(finished(&mut field, &mut was_quoted)),
+            ',' if !quoted => found.push(finish_field(&mut field, &mut was_quoted)),
             c => field.push(c),
         }
     }
-    found.push(finished(&mut field, &mut was_quoted));
+    found.push(finish_field(&mut field, &mut was_quoted));
     found
 }
 
-fn finished(field: &mut String, was_quoted: &mut bool) -> String {
+fn finish_field(field: &mut String, was_quoted: &mut bool) -> String {
     let text = std::mem::take(field);
-    if std::mem::take(was_quoted) { unprotected(&text) } else { text }
+    if std::mem::take(was_quoted) { remove_protection(&text) } else { text }
 }
 
 /// Removes one `'` at the beginning, after any spaces, and after each `;`: there it was added.
-fn unprotected(text: &str) -> String {
+fn remove_protection(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let (mut begins, mut removed) = (true, false);
     for c in text.chars() {

@@ -2,7 +2,7 @@
 
 /// Returns `text` as the content of an element or of a quoted attribute, in HTML and in SVG. Control
 /// characters, which XML does not allow, become U+FFFD.
-pub(crate) fn escaped(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -26,7 +26,7 @@ fn is_direction_control(c: char) -> bool {
 }
 
 /// Returns a name shortened to at most `characters`, the last of which is then `…`.
-pub(crate) fn shortened(name: &str, characters: usize) -> String {
+pub(crate) fn shorten(name: &str, characters: usize) -> String {
     if name.chars().count() <= characters {
         return name.to_owned();
     }
@@ -48,7 +48,7 @@ mod tests {
             ("\u{202e}evil", "\u{fffd}evil"),
             ("Müller √(c/ρ)", "Müller √(c/ρ)"),
         ] {
-            assert_eq!(escaped(text), expected, "{text:?}");
+            assert_eq!(escape(text), expected, "{text:?}");
         }
     }
 
@@ -57,7 +57,7 @@ mod tests {
         for (name, characters, expected) in
             [("patient 1", 9, "patient 1"), ("patient 12", 9, "patient…"), ("äöüß", 3, "äö…")]
         {
-            assert_eq!(shortened(name, characters), expected);
+            assert_eq!(shorten(name, characters), expected);
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Everything is measured in turns, many times over, with slices of the peak in between, and the
 //! smallest time of each bone is kept: the machine's clock and its neighbours vary, and only ever
-//! add. Without `--bench`, as under `cargo test --benches`, it is a short run that shows that
+//! make it longer. Without `--bench`, as under `cargo test --benches`, it is a short run that shows that
 //! all of it works.
 
 #![expect(clippy::expect_used, reason = "the bones are known to have a velocity")]

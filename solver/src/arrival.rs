@@ -10,7 +10,7 @@ pub struct Arrival {
     pub directions: Option<[f64; 2]>,
     /// Time of the picked extremum at each receiver, s, from the first source.
     pub times: Vec<f64>,
-    /// Modulus of its pressure there, Pa, for a pulse of any one amplitude: only ratios mean something.
+    /// Modulus of its pressure there, Pa. The pulse's amplitude is arbitrary, so only ratios mean something.
     pub amplitudes: Vec<f64>,
     /// Estimate of the velocity's relative error by discretisation, ≥ 0.
     pub estimated_error: f64,
@@ -37,13 +37,14 @@ pub struct Sampled {
     pub band: f64,
     /// Time after which the signal repeats, s.
     pub period: f64,
-    /// (Frequency, wavenumber) pairs.
+    /// Number of (frequency, wavenumber) pairs.
     pub pairs: u64,
 }
 
 impl Arrival {
-    /// Combines the arrivals of both directions. Both errors may have the same sign.
-    pub(crate) fn with(self, other: &Self) -> Self {
+    /// Combines the arrivals of both directions. Their errors may have the same sign, so that they do not
+    /// cancel.
+    pub(crate) fn combine(self, other: &Self) -> Self {
         let [one, two] = [self.velocity, other.velocity];
         let passes = self.passes.zip(other.passes).map(|(one, two)| PassSummary {
             count: one.count + two.count,

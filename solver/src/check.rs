@@ -80,10 +80,10 @@ impl Check {
 
     /// Returns the solutions whose velocity is outside the limit.
     pub fn outside_limit(&self) -> impl Iterator<Item = &MethodSolution> {
-        let off = |one: &&MethodSolution| {
+        let is_off = |one: &&MethodSolution| {
             one.difference.velocity().is_some_and(|error| error > self.error_max())
         };
-        [&self.exact].into_iter().chain(&self.hybrid).filter(off)
+        [&self.exact].into_iter().chain(&self.hybrid).filter(is_off)
     }
 }
 

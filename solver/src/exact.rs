@@ -1,17 +1,21 @@
 //! Exact layers in the (frequency, wavenumber) domain.
 //!
-//! A bone is computed in one or several passes (`passes.rs`). The first pass is quick and sufficient for
-//! most bones. As long as its estimated error is large, the band is widened, and then the sampling is
-//! made finer, as it is at once where the first arrival is small compared with later waves. If the pick
-//! is unreliable (late, weak, off the line of the others, or missing), the bone is computed again with
-//! a thorough sampling, whose band is widened if it finds nothing or its estimated error is large. So it
-//! is if the sampling's part of the error is large, or the whole error remains large after all bands; if
-//! the sampling's part is still large, the last passes are finer and leave nothing out.
-//! The results of two passes are blended with a weight from 0 (the first pass is reliable) to 1
-//! (the second replaces it). The tables are made for a geometric grid of speeds, whose intervals
-//! are called speed bins; near the edge of a bin the results of both neighbours are blended, too.
-//! So the velocity remains a continuous function of the bone. All of this depends on the bone
-//! alone.
+//! A bone is computed in one or several passes (`passes.rs`). Each uses the sampling of one grade in
+//! one band. Within a grade, the band is widened while the estimated error is large. The grades, in
+//! their order:
+//!
+//! 1. Quick: suffices for most bones.
+//! 2. Plain, a finer sampling: if the error of the quick grade stays large, or if the first arrival is
+//!    small compared with later waves.
+//! 3. Thorough: if the pick is unreliable (late, weak, off the line of the others, or missing), if the
+//!    sampling's part of the error is large, or if the whole error is large after all bands.
+//! 4. Full, finer still and with nothing left out: if the sampling's part of the error is large even
+//!    then.
+//!
+//! The results of two passes are blended with a weight from 0 (the first is reliable) to 1 (the second
+//! replaces it). The tables are made for a geometric grid of speeds, whose intervals are called speed
+//! bins; near the edge of a bin the results of both neighbours are blended, too. So the velocity
+//! remains a continuous function of the bone. All of this depends on the bone alone.
 
 pub(crate) mod attenuation;
 mod bin_tables;
@@ -84,8 +88,8 @@ impl Exact {
         }
     }
 
-    /// Returns the method for a setup that has the same tables ([`has_tables_of`]), and shares them.
-    pub(crate) fn sharing(&self, setup: &Setup) -> Self {
+    /// Returns the method for another setup with the same tables ([`has_tables_of`]), which it shares.
+    pub(crate) fn with_setup(&self, setup: &Setup) -> Self {
         let prepared = PreparedSetup { setup: *setup, ..self.prepared.clone() };
         Self { prepared, ..self.clone() }
     }
@@ -100,10 +104,10 @@ impl Exact {
             sampling::speed_bin(&self.prepared.setup, speed).ok_or_else(|| too_large(speed))?;
         let caches = &self.without_faces;
         let mut passes = BonePasses::new(&self.prepared, caches, &medium, speed, bin, workspace);
-        let mut found = passes.in_bins();
+        let mut found = passes.run_in_bins();
         if self.needs_faces(&found, speed) {
             passes.caches = &self.with_faces;
-            found = self.with_echoes(found, passes.in_bins(), speed);
+            found = self.with_echoes(found, passes.run_in_bins(), speed);
         }
         let BonePasses { count, pairs, .. } = passes;
         found.map(|found| found.arrival(count, pairs))
@@ -131,7 +135,7 @@ impl Exact {
     ) -> Result<Estimated, Failure> {
         let time = without.as_ref().map_or(0.0, |found| self.time_to_echo(found, speed));
         let weight = 1.0 - weights::rise(time, BEFORE_ECHO);
-        blending::merged(&self.prepared, without, with, weight)
+        blending::merge(&self.prepared, without, with, weight)
     }
 
     /// Returns the least time from a pick to the earliest possible echo, in periods.
@@ -143,9 +147,8 @@ impl Exact {
     }
 }
 
-/// Returns whether two setups have the same tables: they describe coupling, marrow, probe and
-/// sampling, not what is picked, and depend on the bone's thickness by the band that a thin plate needs
-/// alone.
+/// Returns whether two setups have the same tables. Tables describe coupling, marrow, probe and
+/// sampling, not what is picked; the bone's thickness matters only by the band that a thin plate needs.
 pub(crate) fn has_tables_of(setup: &Setup, other: &Setup) -> bool {
     let mut alike = *setup;
     alike.layers.bone_thickness = other.layers.bone_thickness;

@@ -43,9 +43,9 @@ pub struct ObservedRealization {
 }
 
 impl Solver {
-    /// Same as [`Solver::realization`], with these observables. The decay takes no further pass, the
-    /// others a second one. A realization that lacks one of them is a failure: of the kind of the other
-    /// extremum's, or `not_finite`.
+    /// Computes a realization as [`Solver::realization`] does, and these observables of it. The decay takes
+    /// no further pass, the others a second one. A realization that lacks one of them is a failure: of the
+    /// kind of the other extremum's, or `not_finite`.
     pub fn realization_with(
         &self,
         observables: ObservableSet,
@@ -68,7 +68,7 @@ impl Solver {
         workspace: &mut Workspace,
     ) -> Result<RealizationResult, FailureKind> {
         let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
-        let own = ensemble.own_setup(index, self.setup()).map(|own| self.beside(&own));
+        let own = ensemble.own_setup(index, self.setup()).map(|own| self.with_setup(&own));
         let solver = own.as_ref().unwrap_or(self);
         let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
         let needs_other =
@@ -102,7 +102,7 @@ impl Solver {
         workspace: &mut Workspace,
     ) -> Result<ObservedRealization, FailureKind> {
         let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
-        let own = ensemble.own_setup(index, self.setup()).map(|own| self.beside(&own));
+        let own = ensemble.own_setup(index, self.setup()).map(|own| self.with_setup(&own));
         let solver = own.as_ref().unwrap_or(self);
         let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
         let signal = solver.first_signal(&bone, &arrival, workspace);
@@ -130,7 +130,7 @@ impl Solver {
     fn other_arrival(&self, bone: &Bone, workspace: &mut Workspace) -> Result<Arrival, Failure> {
         let setup = self.setup();
         let picking = Picking { extremum: setup.picking.extremum.other(), ..setup.picking };
-        self.beside(&Setup { picking, ..*setup }).arrival(bone, workspace)
+        self.with_setup(&Setup { picking, ..*setup }).arrival(bone, workspace)
     }
 
     /// Returns the decay of an arrival along the array, dB/cm.

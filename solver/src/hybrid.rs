@@ -79,7 +79,7 @@ impl Hybrid {
         Self::with_isa(setup, Isa::fastest())
     }
 
-    /// Same as [`new`](Self::new), on one instruction set. The bits do not depend on it.
+    /// Creates a solver that computes on `isa`. The bits of its results do not depend on the instruction set.
     pub fn with_isa(setup: &Setup, isa: Isa) -> Self {
         Self { setup: *setup, distances: setup.probe.distances().collect(), isa }
     }
@@ -119,7 +119,7 @@ impl Hybrid {
         .arrival()
     }
 
-    /// Same as [`arrival`](Self::arrival), reduced to the data that a job keeps.
+    /// Computes the velocity of one bone, m/s, or the kind of failure: what a job keeps of an arrival.
     pub fn outcome(&self, bone: &Bone, workspace: &mut HybridWorkspace) -> Outcome {
         self.arrival(bone, workspace)
             .map(|arrival| arrival.velocity)

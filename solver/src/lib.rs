@@ -4,9 +4,9 @@
 //!
 //! The exact method solves the layered medium for each frequency and wavenumber: the plate's
 //! admittance by doubling (`plate.rs`, no roots, no branches, no degenerate solids), the fluids in
-//! closed form, a cosine
-//! transform over wavenumbers and a damped Fourier series over frequencies, extrema of the
-//! resulting trigonometric polynomial, and one picked extremum for the whole array.
+//! closed form. A cosine transform over wavenumbers and a damped Fourier series over frequencies give
+//! a trigonometric polynomial in time at each receiver, and one of its extrema is picked for the whole
+//! array.
 //!
 //! Pure: no I/O, no clock, no thread. A velocity's bits are a function of its [`Case`] alone;
 //! tables shared between realizations depend only on layers, probe and solver settings.

@@ -8,7 +8,7 @@ use crate::failure::Failure;
 
 /// An extremum below this fraction of the window's largest one is numerical noise.
 pub(crate) const FLOOR: f64 = 1e-3;
-/// A packet's peak is searched up to this many periods of the centre frequency after an extremum.
+/// A packet's peak is searched for up to this many periods of the centre frequency after an extremum.
 pub(crate) const PACKET_PERIODS: f64 = 1.2;
 /// Largest distance of a pick from the line, in periods of the centre frequency.
 const RESIDUAL_PERIODS_MAX: f64 = 0.05;
@@ -50,7 +50,7 @@ impl Window {
         self.extrema.iter().fold(self.last, |max, e| max.max(e.pressure.abs()))
     }
 
-    /// Returns the ratio of |p| of extremum `rank` to its packet's peak.
+    /// Returns the ratio of |p| of extremum `rank` to its packet's peak; `None` if there are fewer extrema.
     fn ratio(&self, rank: usize, packet: f64) -> Option<f64> {
         let first = self.extrema.get(rank)?;
         let peak = self.extrema[rank..]
@@ -142,7 +142,32 @@ pub(crate) fn line(
     times: &[f64],
     center_frequency: f64,
 ) -> Result<(f64, f64), Failure> {
-    fit(distances, times, RESIDUAL_PERIODS_MAX / center_frequency)
+    let residual_max = RESIDUAL_PERIODS_MAX / center_frequency;
+    let slope = slope(distances, times);
+    let (mean_distance, mean_time) = (mean(distances), mean(times));
+    if !(slope > 0.0 && slope.is_finite()) {
+        return Err(Failure {
+            kind: FailureKind::InconsistentArrival,
+            detail: "the picked extremum does not travel away from the source".to_owned(),
+        });
+    }
+    let mut largest: f64 = 0.0;
+    for (r, (x, t)) in distances.iter().zip(times).enumerate() {
+        let residual = (x - mean_distance - slope * (t - mean_time)).abs() / slope;
+        if residual > residual_max {
+            return Err(Failure {
+                kind: FailureKind::InconsistentArrival,
+                detail: format!(
+                    "the pick at receiver {} is {:.1} ns off the line, allowed are {:.1} ns",
+                    r + 1,
+                    residual * 1e9,
+                    residual_max * 1e9
+                ),
+            });
+        }
+        largest = largest.max(residual);
+    }
+    Ok((slope, largest))
 }
 
 /// The first rank whose ratio exceeds the threshold.
@@ -204,35 +229,6 @@ pub(crate) fn slope(distances: &[f64], times: &[f64]) -> f64 {
 /// Returns the arithmetic mean.
 pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |sum, value| sum + value) / values.len() as f64
-}
-
-/// Returns the slope, and the largest residual, s.
-fn fit(distances: &[f64], times: &[f64], residual_max: f64) -> Result<(f64, f64), Failure> {
-    let slope = slope(distances, times);
-    let (mean_distance, mean_time) = (mean(distances), mean(times));
-    if !(slope > 0.0 && slope.is_finite()) {
-        return Err(Failure {
-            kind: FailureKind::InconsistentArrival,
-            detail: "the picked extremum does not travel away from the source".to_owned(),
-        });
-    }
-    let mut largest: f64 = 0.0;
-    for (r, (x, t)) in distances.iter().zip(times).enumerate() {
-        let residual = (x - mean_distance - slope * (t - mean_time)).abs() / slope;
-        if residual > residual_max {
-            return Err(Failure {
-                kind: FailureKind::InconsistentArrival,
-                detail: format!(
-                    "the pick at receiver {} is {:.1} ns off the line, allowed are {:.1} ns",
-                    r + 1,
-                    residual * 1e9,
-                    residual_max * 1e9
-                ),
-            });
-        }
-        largest = largest.max(residual);
-    }
-    Ok((slope, largest))
 }
 
 #[cfg(test)]

@@ -41,7 +41,7 @@ impl Solver {
         Self::with_isa(setup, Isa::fastest())
     }
 
-    /// Same as [`new`](Self::new), on one instruction set. The bits do not depend on it.
+    /// Creates a solver that computes on `isa`. The bits of its results do not depend on the instruction set.
     pub fn with_isa(setup: &Setup, isa: Isa) -> Self {
         let memory = Arc::new(TableMemory::default());
         let probe = &setup.probe;
@@ -61,23 +61,22 @@ impl Solver {
     /// Makes this the solver for cases of `setup`. Tables that stay the same are kept.
     pub fn change_setup(&mut self, setup: &Setup) {
         if self.setup != *setup {
-            *self = self.beside(setup);
+            *self = self.with_setup(setup);
         }
     }
 
-    /// Returns a solver for another setup, which shares the tables if they are the same.
-    pub(crate) fn beside(&self, setup: &Setup) -> Self {
+    /// Returns a solver for another setup. It shares this one's tables if the setup has the same.
+    pub(crate) fn with_setup(&self, setup: &Setup) -> Self {
         if !has_tables_of(setup, &self.setup) {
             return Self::with_isa(setup, self.isa);
         }
-        let reversed = self
-            .reversed
-            .as_ref()
-            .map(|exact| exact.sharing(&Setup { probe: setup.probe.from_other_side(), ..*setup }));
+        let reversed = self.reversed.as_ref().map(|exact| {
+            exact.with_setup(&Setup { probe: setup.probe.from_other_side(), ..*setup })
+        });
         Self {
             setup: *setup,
             isa: self.isa,
-            exact: self.exact.sharing(setup),
+            exact: self.exact.with_setup(setup),
             reversed,
             hybrid: Hybrid::with_isa(setup, self.isa),
         }
@@ -129,14 +128,14 @@ impl Solver {
             return Ok(Arrival { directions: Some([found.velocity; 2]), ..found });
         };
         match reversed.arrival(bone, &mut workspace.exact) {
-            Ok(other) => Ok(found.with(&other)),
+            Ok(other) => Ok(found.combine(&other)),
             Err(Failure { kind, detail }) => {
                 Err(Failure { kind, detail: format!("from the second source: {detail}") })
             }
         }
     }
 
-    /// Same as [`arrival`](Self::arrival), reduced to the data that a job keeps.
+    /// Computes the velocity of one bone, m/s, or the kind of failure: what a job keeps of an arrival.
     pub fn outcome(&self, bone: &Bone, workspace: &mut Workspace) -> Outcome {
         self.arrival(bone, workspace)
             .map(|arrival| arrival.velocity)

@@ -113,7 +113,7 @@ fn bone() -> impl Strategy<Value = Option<Bone>> {
 }
 
 /// The solid whose density and longitudinal speed are the coupling's.
-fn matched(setup: &Setup) -> Option<Bone> {
+fn bone_like_coupling(setup: &Setup) -> Option<Bone> {
     let Fluid { density, sound_speed, .. } = setup.layers.coupling;
     let stiffness = density * sound_speed * sound_speed;
     let mut rows = [[0.0; 6]; 6];
@@ -163,7 +163,7 @@ fn check_traces(solver: &Solver, bone: &Bone) {
 #[test]
 fn traces_are_bounded_together() {
     let mut setup = Setup::default();
-    let bone = matched(&setup).unwrap();
+    let bone = bone_like_coupling(&setup).unwrap();
     setup.probe.receivers.count = 64;
     let solver = Solver::new(&setup);
     let refusal = |duration, time_step| {
@@ -193,7 +193,7 @@ fn traces_are_bounded_together() {
 fn traces_next_to_the_source_end() {
     let mut setup = Setup::default();
     setup.probe.receivers.count = 3;
-    let bone = matched(&setup).unwrap();
+    let bone = bone_like_coupling(&setup).unwrap();
     let mut before = 0.0;
     for first_x1 in [1e-3, 1e-6, 1e-12, 1e-20, 1e-40, 1e-300] {
         setup.probe.receivers.first_x1 = first_x1;
@@ -212,7 +212,7 @@ properties! {
 
     fn a_velocity_or_a_typed_failure(setup in setup(), bone in bone()) {
         prop_assume!(is_admissible(&setup));
-        let Some(bone) = bone.or_else(|| matched(&setup)) else {
+        let Some(bone) = bone.or_else(|| bone_like_coupling(&setup)) else {
             return Ok(());
         };
         let solver = Solver::new(&setup);
@@ -245,7 +245,7 @@ properties! {
             prop_assert!(wave.group_velocity.is_finite(), "{waves:?}");
         }
         // Another bone in between leaves no mark.
-        if let Some(other) = matched(&setup) {
+        if let Some(other) = bone_like_coupling(&setup) {
             let _other = solver.arrival(&other, &mut workspace);
         }
         prop_assert_eq!(&solver.arrival(&bone, &mut workspace), &found);

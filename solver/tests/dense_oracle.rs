@@ -21,7 +21,6 @@ struct Plate<'a> {
 }
 
 impl Plate<'_> {
-    /// (A_jl)_im = c_ijml.
     fn block(&self, j: usize, l: usize) -> Mat<c64> {
         let entry = |i, m| self.factor * self.bone.elasticity.component(i, j, m, l);
         Mat::from_fn(3, 3, entry)
@@ -76,7 +75,7 @@ fn constant_quality(found: &Attenuation, s: c64) -> c64 {
     (s / (TAU * found.reference_frequency)).powf(2.0 * (1.0 / quality).atan() / PI)
 }
 
-fn thin() -> Setup {
+fn thin_plate_setup() -> Setup {
     let mut setup = Setup::default();
     setup.layers.bone_thickness = 0.6e-3;
     setup
@@ -84,7 +83,7 @@ fn thin() -> Setup {
 
 #[test]
 fn random_plates_agree_with_dense_eigenvectors() {
-    check(&thin());
+    check(&thin_plate_setup());
 }
 
 #[test]
@@ -94,7 +93,7 @@ fn attenuated_plates_agree_with_dense_eigenvectors() {
         reference_frequency,
     };
     for (bone, marrow) in [(10.0, None), (5.0, Some(30.0)), (400.0, Some(2.0))] {
-        let mut setup = thin();
+        let mut setup = thin_plate_setup();
         setup.layers.bone_attenuation = quality(bone, 0.7e6);
         if let Some(marrow) = marrow {
             setup.layers.marrow.attenuation = quality(marrow, 3e6);

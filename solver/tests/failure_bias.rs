@@ -22,7 +22,7 @@ const MONTE_CARLO: MonteCarlo = MonteCarlo {
 };
 
 /// The paper's optimum with another dispersion.
-fn at(dispersion: f64) -> Point {
+fn optimum_with_dispersion(dispersion: f64) -> Point {
     Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion])
 }
 
@@ -36,12 +36,12 @@ fn outcomes(point: &Point) -> Vec<Outcome> {
 }
 
 /// Without the slowest of those that have a velocity, a `part` of them.
-fn without_slowest(outcomes: &[Outcome], part: f64) -> Vec<Outcome> {
+fn drop_slowest(outcomes: &[Outcome], part: f64) -> Vec<Outcome> {
     let mut ascending = velocities(outcomes);
     ascending.sort_by(f64::total_cmp);
     let limit = ascending[(part * ascending.len() as f64) as usize];
-    let failed = |outcome: &Outcome| outcome.is_ok_and(|velocity| velocity < limit);
-    let cut = |outcome| if failed(outcome) { Err(FailureKind::NoArrival) } else { *outcome };
+    let is_slow = |outcome: &Outcome| outcome.is_ok_and(|velocity| velocity < limit);
+    let cut = |outcome| if is_slow(outcome) { Err(FailureKind::NoArrival) } else { *outcome };
     outcomes.iter().map(cut).collect()
 }
 
@@ -58,11 +58,11 @@ fn difference(a: Moments, b: Moments) -> [f64; 2] {
 #[test]
 fn the_bias_of_failures_is_what_the_slowest_draws_make() {
     for (dispersion, parts) in [(0.1029, &[0.03][..]), (0.3, &[0.03, 0.1]), (0.6, &[0.03])] {
-        let point = at(dispersion);
+        let point = optimum_with_dispersion(dispersion);
         let all = outcomes(&point);
         let before = failure_bias(&MONTE_CARLO, &point, &all).unwrap();
         for &part in parts {
-            let cut = without_slowest(&all, part);
+            let cut = drop_slowest(&all, part);
             let after = failure_bias(&MONTE_CARLO, &point, &cut).unwrap();
             let [whole, rest] =
                 [&all, &cut].map(|outcomes| moments(&velocities(outcomes)).unwrap());

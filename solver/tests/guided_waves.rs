@@ -82,7 +82,7 @@ fn rayleigh_lamb(slow: f64, symmetric: bool, k: f64, omega: f64) -> f64 {
 }
 
 /// Phase and group velocity of a root that is followed from low frequencies, where it is `start`.
-fn followed(slow: f64, symmetric: bool, omega: f64, start: impl Fn(f64) -> f64) -> [f64; 2] {
+fn follow_root(slow: f64, symmetric: bool, omega: f64, start: impl Fn(f64) -> f64) -> [f64; 2] {
     let function = |k: f64, omega: f64| rayleigh_lamb(slow, symmetric, k, omega);
     let steps = 8000;
     let at = |step: i32| omega * f64::from(step) / f64::from(steps);
@@ -127,8 +127,8 @@ fn an_isotropic_plate_obeys_rayleigh_and_lamb() {
             let [a0, s0] = both(&waves(&bone, thickness, frequency));
             let omega = TAU * frequency * 0.5 * thickness / shear;
             let flexural = |omega: f64| (3.0f64.sqrt() * omega / plate).sqrt();
-            let expected_a0 = followed(slow, false, omega, flexural);
-            let expected_s0 = followed(slow, true, omega, |omega| omega / plate);
+            let expected_a0 = follow_root(slow, false, omega, flexural);
+            let expected_s0 = follow_root(slow, true, omega, |omega| omega / plate);
             for (found, [phase, group]) in [(a0, expected_a0), (s0, expected_s0)] {
                 let phase = found.phase_velocity / (phase * shear) - 1.0;
                 let group = found.group_velocity / (group * shear) - 1.0;

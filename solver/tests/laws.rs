@@ -47,7 +47,7 @@ fn arrival(setup: &Setup, bone: &Bone) -> Arrival {
 }
 
 /// Largest difference of two arrivals' times, s.
-fn later(a: &Arrival, b: &Arrival) -> f64 {
+fn largest_delay(a: &Arrival, b: &Arrival) -> f64 {
     a.times.iter().zip(&b.times).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
@@ -226,7 +226,7 @@ fn power_into_the_plate_is_radiated_into_the_marrow() {
         for (k, omega) in [(100.0, 2e6), (1500.0, 5e6), (4000.0, 1.1e7)] {
             let s = Complex::new(1e-9 * omega, omega);
             // No echo comes back from a face that far away.
-            let on = |density: f64| {
+            let admittance_on = |density: f64| {
                 let mut setup = Setup::default();
                 setup.layers.marrow.thickness = 1e15;
                 setup.layers.marrow.density = density;
@@ -235,9 +235,10 @@ fn power_into_the_plate_is_radiated_into_the_marrow() {
             // The marrow's load Z = ρ s²/g is imaginary and proportional to its density, and
             // |∂Y/∂Z| is |u3(-h)/p(0)|² by reciprocity: so this is |Im Z| |u3(-h)|².
             let step = 1e-4;
-            let change = on(1000.0 * (1.0 + step)) - on(1000.0 * (1.0 - step));
+            let change =
+                admittance_on(1000.0 * (1.0 + step)) - admittance_on(1000.0 * (1.0 - step));
             let radiated = change.abs() / (2.0 * step);
-            let taken = on(1000.0).im.abs();
+            let taken = admittance_on(1000.0).im.abs();
             let error = (taken - radiated).abs() / radiated;
             // The central difference is right to the square of its step over the resonance's width.
             assert!(error < 1e-5, "index {index}, k {k}, omega {omega}: {error:e}");
@@ -261,7 +262,7 @@ fn source_and_receivers_may_be_exchanged() {
         setup.probe.receivers.x3 = 1e-3;
         let (back, back_traces) = (arrival(&setup, &bone), traces(&setup));
         // Rounding of the echoes, amplified by the picking.
-        assert!(later(&there, &back) < 1e-16, "index {index}: {there:?} {back:?}");
+        assert!(largest_delay(&there, &back) < 1e-16, "index {index}: {there:?} {back:?}");
         for (there, back) in there_traces.pressures.iter().zip(&back_traces.pressures) {
             let largest = there.iter().fold(0.0, |max: f64, p| max.max(p.abs()));
             let difference = there.iter().zip(back).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -278,7 +279,7 @@ fn position_along_the_bone_does_not_matter() {
     setup.probe.source = Source { x1: 1.0, x3: 2e-3 };
     setup.probe.receivers.first_x1 = 1.0 + 11e-3;
     // 1.0 + x - 1.0 loses sixteen digits less three.
-    assert!(later(&here, &arrival(&setup, &bone)) < 1e-16 * 1e3);
+    assert!(largest_delay(&here, &arrival(&setup, &bone)) < 1e-16 * 1e3);
 }
 
 #[test]
@@ -297,7 +298,7 @@ fn the_mirrored_bone_sends_the_same_wave() {
         // Above refinement 1 the series of a sublayer is summed to rounding.
         let mut setup = Setup::default();
         setup.solver.refinement = 1.5;
-        let difference = later(&arrival(&setup, &bone), &arrival(&setup, &mirrored));
+        let difference = largest_delay(&arrival(&setup, &bone), &arrival(&setup, &mirrored));
         // Rounding of Y, amplified by the picking.
         assert!(difference < 1e-13, "index {index}: {difference:e}");
     }

@@ -52,7 +52,7 @@ fn velocity(setup: &Setup, bone: &Bone) -> f64 {
 }
 
 /// The paper's geometry at refinement 2, for limits that are reached to a thousandth.
-fn refined(change: impl Fn(&mut Setup)) -> Setup {
+fn refined_setup(change: impl Fn(&mut Setup)) -> Setup {
     let mut setup = Setup::default();
     setup.solver.refinement = 2.0;
     change(&mut setup);
@@ -65,7 +65,7 @@ fn the_first_signal_of_a_thick_plate_is_the_lateral_wave() {
         let bone = orthotropic(&draw(0.1029, 31, index));
         let lateral = (bone.elasticity.rows()[0][0] / bone.density).sqrt();
         let behind = |first_x1: f64| {
-            let setup = refined(|setup| {
+            let setup = refined_setup(|setup| {
                 setup.layers.bone_thickness = 20e-3;
                 setup.probe.receivers.first_x1 = first_x1;
                 setup.probe.receivers.count = 5;
@@ -87,12 +87,12 @@ fn the_first_signal_of_a_thick_plate_is_the_lateral_wave() {
 fn the_lower_face_of_a_thick_plate_is_not_heard() {
     for index in 0..3 {
         let bone = orthotropic(&draw(0.1029, 31, index));
-        let of = |thickness: f64| {
-            velocity(&refined(|setup| setup.layers.bone_thickness = thickness), &bone)
+        let velocity_at = |thickness: f64| {
+            velocity(&refined_setup(|setup| setup.layers.bone_thickness = thickness), &bone)
         };
         // To the lower face and back it is longer than to the end of the first packet: what
         // remains is the sampling's error at refinement 2.
-        let change = of(12e-3) / of(24e-3) - 1.0;
+        let change = velocity_at(12e-3) / velocity_at(24e-3) - 1.0;
         assert!(change.abs() < 1e-5, "index {index}: {change:e}");
     }
 }
@@ -105,7 +105,8 @@ fn the_first_signal_of_a_thin_plate_is_the_plate_wave() {
         let largest = 0.5 * (a + d) + (0.25 * (a - d) * (a - d) + b * b).sqrt();
         let plate = (largest / bone.density).sqrt();
         let ahead = |thickness: f64| {
-            velocity(&refined(|setup| setup.layers.bone_thickness = thickness), &bone) / plate - 1.0
+            velocity(&refined_setup(|setup| setup.layers.bone_thickness = thickness), &bone) / plate
+                - 1.0
         };
         // The wavelength is 4 mm. The load of the fluids moves the wave, in proportion to the
         // thickness: 1 % where it is a fortieth of the wavelength.

@@ -21,7 +21,7 @@ fn arrival(setup: &Setup, bone: &Bone) -> Arrival {
 }
 
 /// A setup with a tilted probe; source and receivers have different heights also without the tilt.
-fn tilted(tilt: f64) -> Setup {
+fn tilted_setup(tilt: f64) -> Setup {
     let mut setup = Setup::default();
     setup.solver.refinement = 3.0;
     setup.probe.tilt = tilt;
@@ -43,7 +43,7 @@ fn level(setup: &Setup, place: Place) -> Setup {
 #[test]
 fn places_are_those_of_a_rigid_probe_turned_about_the_source() {
     for degrees in [-3.0, 0.0, 2.0] {
-        let probe = tilted(degrees * DEGREE).probe;
+        let probe = tilted_setup(degrees * DEGREE).probe;
         let places: Vec<Place> = probe.places().collect();
         for (place, distance) in places.iter().zip(probe.distances()) {
             let (across, height) = (place.x, place.x3 - probe.source.x3);
@@ -61,7 +61,7 @@ fn places_are_those_of_a_rigid_probe_turned_about_the_source() {
 fn each_receiver_hears_what_a_level_one_at_its_height_does() {
     let bone = random_bone();
     for (degrees, coupling) in [(1.5, 20e-3), (-3.0, 20e-3), (2.0, 5.5e-3)] {
-        let mut setup = tilted(degrees * DEGREE);
+        let mut setup = tilted_setup(degrees * DEGREE);
         setup.layers.coupling.thickness = coupling;
         let found = arrival(&setup, &bone);
         let places: Vec<Place> = setup.probe.places().collect();
@@ -77,7 +77,7 @@ fn each_receiver_hears_what_a_level_one_at_its_height_does() {
 #[test]
 fn traces_are_those_of_level_receivers() {
     let bone = random_bone();
-    let mut setup = tilted(2.0 * DEGREE);
+    let mut setup = tilted_setup(2.0 * DEGREE);
     setup.solver.refinement = 1.0;
     setup.layers.coupling.thickness = 4e-3;
     let traces = |setup: &Setup| Solver::new(setup).traces(&bone, 12e-6, 50e-9).unwrap().pressures;
@@ -96,7 +96,7 @@ fn traces_are_those_of_level_receivers() {
 #[test]
 fn the_second_direction_is_that_of_exchanged_source_and_receivers() {
     let bone = random_bone();
-    let mut setup = tilted(DEGREE);
+    let mut setup = tilted_setup(DEGREE);
     setup.probe.bidirectional = true;
     let both = arrival(&setup, &bone);
     let [one, two] = both.directions.unwrap();

@@ -46,8 +46,7 @@ pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, 
 
 fn row(cell: &Cell) -> Vec<String> {
     let both = Both::new(&cell.setup(SolverSettings::default()), cell.isa());
-    let measured: Vec<MeasuredDraw> =
-        cell.each(|_, bone, workspace| both.measured(bone, workspace));
+    let measured: Vec<MeasuredDraw> = cell.each(|_, bone, workspace| both.measure(bone, workspace));
     let mut row = vec![millimetres(cell.thickness), cell.dispersion.to_string()];
     row.extend(summary(&measured));
     row
@@ -69,7 +68,7 @@ impl Both {
         Self { setup: *setup, default, reference }
     }
 
-    pub(crate) fn measured(
+    pub(crate) fn measure(
         &self,
         bone: &Result<Bone, Failure>,
         workspace: &mut Workspace,

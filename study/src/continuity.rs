@@ -7,7 +7,7 @@ use osteon_common::settings::SolverSettings;
 use osteon_solver::check::{Difference, difference};
 use osteon_solver::{Failure, fastest_wave};
 
-use crate::draws::{Draws, arrival, cells, not_elastic};
+use crate::draws::{Draws, arrival, cells, not_elastic_failure};
 use crate::generator::Generator;
 use crate::spread::DifferenceSummary;
 use crate::table::{MarkdownTable, millimetres, two_digits};
@@ -50,7 +50,8 @@ pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, 
             if let (Ok(bone), 1) = (&mut bone, index % 2) {
                 bone.density = density_on_edge(bone, &setup);
             }
-            let moved = bone.as_ref().map_err(Clone::clone).and_then(|bone| moved(bone, index));
+            let moved =
+                bone.as_ref().map_err(Clone::clone).and_then(|bone| move_entries(bone, index));
             let first = arrival(&solver, &bone, workspace);
             difference(&setup, &arrival(&solver, &moved, workspace), &first)
         });
@@ -86,14 +87,14 @@ fn density_on_edge(bone: &Bone, setup: &Setup) -> f64 {
 
 /// Returns the bone with each of its 21 entries changed by a fraction between ±[`CHANGE`] that is
 /// derived from `index`.
-fn moved(bone: &Bone, index: u64) -> Result<Bone, Failure> {
+fn move_entries(bone: &Bone, index: u64) -> Result<Bone, Failure> {
     let mut rows = *bone.elasticity.rows();
     let mut generator = Generator::new(index);
     for (i, j) in (0..6).flat_map(|i| (i..6).map(move |j| (i, j))) {
         rows[i][j] *= 1.0 + CHANGE * generator.between(-1.0, 1.0);
         rows[j][i] = rows[i][j];
     }
-    let elasticity = Elasticity::new(rows).map_err(not_elastic)?;
+    let elasticity = Elasticity::new(rows).map_err(not_elastic_failure)?;
     Ok(Bone { density: bone.density, elasticity })
 }
 
@@ -109,7 +110,7 @@ mod tests {
     fn every_entry_moves_a_little_and_not_the_same_way() {
         let elasticity = OPTIMUM.constants().elasticity().unwrap();
         let bone = Bone { density: OPTIMUM.density(), elasticity };
-        let (one, other) = (moved(&bone, 1).unwrap(), moved(&bone, 2).unwrap());
+        let (one, other) = (move_entries(&bone, 1).unwrap(), move_entries(&bone, 2).unwrap());
         assert_ne!(one, other);
         for i in 0..6 {
             for j in 0..6 {

@@ -49,7 +49,7 @@ pub fn table(isa: Isa, progress: RowCallback<'_>) -> Result<MarkdownTable, Study
                 progress(&table.last_row());
             }
         }
-        Err(failure) => table.push(failed(&failure)),
+        Err(failure) => table.push(failure_row(&failure)),
     }
     Ok(table)
 }
@@ -71,7 +71,7 @@ fn all_series(setup: &Setup, bone: &Bone) -> Vec<RefinementSeries> {
 fn add(table: &mut MarkdownTable, series: &RefinementSeries) {
     let rows = match &series.rows {
         Ok(rows) => rows,
-        Err(failure) => return table.push(failed(failure)),
+        Err(failure) => return table.push(failure_row(failure)),
     };
     let mut before: Option<(f64, f64)> = None;
     for row in rows {
@@ -87,7 +87,7 @@ fn add(table: &mut MarkdownTable, series: &RefinementSeries) {
     }
 }
 
-fn failed(failure: &Failure) -> Vec<String> {
+fn failure_row(failure: &Failure) -> Vec<String> {
     vec![failure.kind.name().to_owned()]
 }
 

@@ -84,12 +84,12 @@ impl Cell {
 
     /// Returns the bone at `index`, or the failure if it cannot be drawn.
     pub(crate) fn bone(&self, index: u64) -> Result<Bone, Failure> {
-        self.ensemble.bone(index).map_err(not_elastic)
+        self.ensemble.bone(index).map_err(not_elastic_failure)
     }
 }
 
 /// Returns the failure of a bone whose matrix is not an elasticity.
-pub(crate) fn not_elastic(error: NotElastic) -> Failure {
+pub(crate) fn not_elastic_failure(error: NotElastic) -> Failure {
     Failure { kind: FailureKind::NotFinite, detail: error.to_string() }
 }
 
@@ -103,7 +103,11 @@ pub(crate) fn arrival(
 }
 
 /// Computes the first `count` realizations of an ensemble, in index order.
-pub(crate) fn solved(solver: &Solver, ensemble: &Ensemble, count: u64) -> Vec<RealizationResult> {
+pub(crate) fn solve_realizations(
+    solver: &Solver,
+    ensemble: &Ensemble,
+    count: u64,
+) -> Vec<RealizationResult> {
     let realization =
         |workspace: &mut Workspace, index| solver.realization(ensemble, index, workspace);
     (0..count).into_par_iter().map_init(Workspace::default, realization).collect()

@@ -12,7 +12,7 @@ use osteon_common::realization::{Ensemble, PointError};
 use osteon_search::{CompletedJob, IdentifyError};
 use osteon_solver::{Isa, Solver};
 
-use crate::draws::solved;
+use crate::draws::solve_realizations;
 
 /// Cache of the realizations at the points at which several identifications begin, by the bits of
 /// the point.
@@ -51,7 +51,7 @@ impl Surroundings {
     ) -> Result<Vec<Outcome>, PointError> {
         let ensemble = Ensemble::drawn(point, monte_carlo.germs())?.with_random(self.random);
         let solver = Solver::with_isa(&self.setup, isa);
-        let solved = solved(&solver, &ensemble, monte_carlo.realizations);
+        let solved = solve_realizations(&solver, &ensemble, monte_carlo.realizations);
         Ok(solved.into_iter().map(|one| one.outcome).collect())
     }
 }
@@ -101,7 +101,7 @@ pub(crate) fn identify(
             return Ok(found.clone());
         }
         solver.change_setup(&realizations.point.setup(&specification.setup));
-        let found = solved(&solver, &realizations.ensemble, realizations.count);
+        let found = solve_realizations(&solver, &realizations.ensemble, realizations.count);
         if is_first {
             known.insert(bits, found.clone());
         }

@@ -67,20 +67,20 @@ fn main() -> ExitCode {
     let Arguments { study } = Arguments::parse();
     let isa = match Isa::chosen(std::env::var_os(Isa::VARIABLE)) {
         Ok(isa) => isa,
-        Err(error) => return failed(&error, 2),
+        Err(error) => return report_failure(&error, 2),
     };
-    let text = match measured(study, isa) {
+    let text = match run_study(study, isa) {
         Ok(text) => text,
-        Err(error) => return failed(&error, 1),
+        Err(error) => return report_failure(&error, 1),
     };
     match std::io::stdout().write_all(text.as_bytes()) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => failed(&error, 1),
+        Err(error) => report_failure(&error, 1),
     }
 }
 
 /// Prints the reason why there is no table; returns the exit code.
-fn failed(error: &dyn std::error::Error, code: u8) -> ExitCode {
+fn report_failure(error: &dyn std::error::Error, code: u8) -> ExitCode {
     say(&format!("osteon-study: {error}"));
     ExitCode::from(code)
 }
@@ -92,32 +92,36 @@ fn say(line: &str) {
 }
 
 /// Returns the table of a study below the command line that reproduces it.
-fn measured(study: Study, isa: Isa) -> Result<String, StudyError> {
+fn run_study(study: Study, isa: Isa) -> Result<String, StudyError> {
     match study {
-        Study::Failures(arguments) => over_draws(&FAILURES, arguments, isa),
-        Study::Accuracy(arguments) => over_draws(&ACCURACY, arguments, isa),
-        Study::Methods(arguments) => over_draws(&METHODS, arguments, isa),
-        Study::Models(arguments) => over_draws(&MODELS, arguments, isa),
-        Study::Digest(arguments) => over_draws(&DIGEST, arguments, isa),
-        Study::Refinement(arguments) => over_draws(&REFINEMENT, arguments, isa),
-        Study::Setups(arguments) => over_draws(&SETUPS, arguments, isa),
-        Study::Searches(arguments) => over_draws(&SEARCHES, arguments, isa),
-        Study::Continuity(arguments) => over_draws(&CONTINUITY, arguments, isa),
-        Study::Variance(arguments) => over_seeds(arguments, isa),
-        Study::Twins(arguments) => over_twins("twins", twins::SETS, twins::table, arguments, isa),
+        Study::Failures(arguments) => run_over_draws(&FAILURES, arguments, isa),
+        Study::Accuracy(arguments) => run_over_draws(&ACCURACY, arguments, isa),
+        Study::Methods(arguments) => run_over_draws(&METHODS, arguments, isa),
+        Study::Models(arguments) => run_over_draws(&MODELS, arguments, isa),
+        Study::Digest(arguments) => run_over_draws(&DIGEST, arguments, isa),
+        Study::Refinement(arguments) => run_over_draws(&REFINEMENT, arguments, isa),
+        Study::Setups(arguments) => run_over_draws(&SETUPS, arguments, isa),
+        Study::Searches(arguments) => run_over_draws(&SEARCHES, arguments, isa),
+        Study::Continuity(arguments) => run_over_draws(&CONTINUITY, arguments, isa),
+        Study::Variance(arguments) => run_over_seeds(arguments, isa),
+        Study::Twins(arguments) => {
+            run_over_twins("twins", twins::SETS, twins::table, arguments, isa)
+        }
         Study::Coverage(arguments) => {
-            over_twins("coverage", twins::REPETITIONS, twins::coverage, arguments, isa)
+            run_over_twins("coverage", twins::REPETITIONS, twins::coverage, arguments, isa)
         }
         Study::Populations(arguments) => {
-            over_twins("populations", twins::REPETITIONS, twins::populations, arguments, isa)
+            run_over_twins("populations", twins::REPETITIONS, twins::populations, arguments, isa)
         }
-        Study::Posteriors(arguments) => over_posteriors(arguments, isa),
-        Study::PosteriorReference(arguments) => over_draws(&POSTERIOR_REFERENCE, arguments, isa),
-        Study::Convergence => Ok(titled("convergence", &convergence::table(isa, &say)?)),
+        Study::Posteriors(arguments) => run_over_posteriors(arguments, isa),
+        Study::PosteriorReference(arguments) => {
+            run_over_draws(&POSTERIOR_REFERENCE, arguments, isa)
+        }
+        Study::Convergence => Ok(add_title("convergence", &convergence::table(isa, &say)?)),
     }
 }
 
-fn over_draws(
+fn run_over_draws(
     study: &OverDraws,
     arguments: DrawsArguments,
     isa: Isa,
@@ -126,16 +130,16 @@ fn over_draws(
     let draws = Draws { realizations, seed: arguments.seed, isa };
     let table = (study.table)(&draws, &say)?;
     let (name, seed) = (study.name, arguments.seed);
-    Ok(titled(&format!("{name} --realizations {realizations} --seed {seed}"), &table))
+    Ok(add_title(&format!("{name} --realizations {realizations} --seed {seed}"), &table))
 }
 
-fn over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, StudyError> {
+fn run_over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, StudyError> {
     let RepetitionsArguments { seeds, seed: first } = arguments;
     let table = variance::table(&Repetitions { seeds, first, isa }, &say)?;
-    Ok(titled(&format!("variance --seeds {seeds} --seed {first}"), &table))
+    Ok(add_title(&format!("variance --seeds {seeds} --seed {first}"), &table))
 }
 
-fn over_twins(
+fn run_over_twins(
     name: &str,
     repetitions: u64,
     table: fn(&Twins, RowCallback<'_>) -> Result<MarkdownTable, StudyError>,
@@ -145,10 +149,10 @@ fn over_twins(
     let repetitions = arguments.repetitions.unwrap_or(repetitions);
     let seed = arguments.seed;
     let table = table(&Twins { repetitions, seed, isa }, &say)?;
-    Ok(titled(&format!("{name} --repetitions {repetitions} --seed {seed}"), &table))
+    Ok(add_title(&format!("{name} --repetitions {repetitions} --seed {seed}"), &table))
 }
 
-fn over_posteriors(arguments: PosteriorsArguments, isa: Isa) -> Result<String, StudyError> {
+fn run_over_posteriors(arguments: PosteriorsArguments, isa: Isa) -> Result<String, StudyError> {
     let PosteriorsArguments { scenario, velocities, first, twins } = arguments;
     let repetitions = twins.repetitions.unwrap_or(posteriors::REPETITIONS);
     let seed = twins.seed;
@@ -158,10 +162,10 @@ fn over_posteriors(arguments: PosteriorsArguments, isa: Isa) -> Result<String, S
          {repetitions} --seed {seed}",
         scenario.name()
     );
-    Ok(titled(&command, &posteriors::table(&study, &say)?))
+    Ok(add_title(&command, &posteriors::table(&study, &say)?))
 }
 
 /// Returns a table below the command that reproduces it.
-fn titled(arguments: &str, table: &MarkdownTable) -> String {
+fn add_title(arguments: &str, table: &MarkdownTable) -> String {
     format!("`osteon-study {arguments}` ({})\n\n{table}", version::fingerprint())
 }

@@ -8,7 +8,7 @@ use osteon_solver::Workspace;
 use rayon::prelude::*;
 
 use crate::accuracy::{Both, MeasuredDraw, SUMMARY, summary};
-use crate::draws::{Draws, not_elastic};
+use crate::draws::{Draws, not_elastic_failure};
 use crate::generator::Generator;
 use crate::table::{MarkdownTable, millimetres};
 use crate::{RowCallback, StudyError};
@@ -39,14 +39,14 @@ pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, 
     let mut table = MarkdownTable::new(&[&["plate (mm)"][..], &SUMMARY].concat());
     for thickness in THICKNESSES {
         let mut row = vec![millimetres(thickness)];
-        row.extend(summary(&measured(thickness, draws)?));
+        row.extend(summary(&measure_draws(thickness, draws)?));
         table.push(row);
         progress(&table.last_row());
     }
     Ok(table)
 }
 
-fn measured(thickness: f64, draws: &Draws) -> Result<Vec<MeasuredDraw>, PointError> {
+fn measure_draws(thickness: f64, draws: &Draws) -> Result<Vec<MeasuredDraw>, PointError> {
     let mut setup = Setup::default();
     setup.layers.bone_thickness = thickness;
     let both = Both::new(&setup, draws.isa);
@@ -54,7 +54,7 @@ fn measured(thickness: f64, draws: &Draws) -> Result<Vec<MeasuredDraw>, PointErr
         .into_par_iter()
         .map_init(Workspace::default, |workspace, index| {
             let bone = Ensemble::new(&mean_model(draws.seed, index), draws.seed)?.bone(index);
-            Ok(both.measured(&bone.map_err(not_elastic), workspace))
+            Ok(both.measure(&bone.map_err(not_elastic_failure), workspace))
         })
         .collect()
 }
@@ -63,14 +63,14 @@ fn measured(thickness: f64, draws: &Draws) -> Result<Vec<MeasuredDraw>, PointErr
 /// admissible.
 pub(crate) fn mean_model(seed: u64, index: u64) -> Point {
     let mut generator = Generator::for_index(seed, index);
-    let mut drawn = || Point::of_bone(BOUNDS.map(|(from, to)| generator.between(from, to)));
+    let mut draw = || Point::of_bone(BOUNDS.map(|(from, to)| generator.between(from, to)));
     for _ in 1..TRIES_MAX {
-        let point = drawn();
+        let point = draw();
         if point.constants().elasticity().is_ok() {
             return point;
         }
     }
-    drawn()
+    draw()
 }
 
 #[cfg(test)]
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn the_first_arrival_may_be_weak_and_is_right() {
         let draws = Draws { realizations: 40, seed: 1, isa: Isa::fastest() };
-        let measured = measured(4e-3, &draws).unwrap();
+        let measured = measure_draws(4e-3, &draws).unwrap();
         let largest: f64 = summary(&measured)[2].parse().unwrap();
         assert!(largest < 1.5e-4, "{largest}");
     }

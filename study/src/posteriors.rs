@@ -22,7 +22,7 @@ use osteon_common::statistics::PointStatistics;
 use rayon::prelude::*;
 
 pub use self::calibration::{PosteriorCalibration, Scenario};
-use self::data::simulated;
+use self::data::simulate_data;
 use self::ranks::Ranks;
 use crate::identify::{RealizationCache, identify, outcomes};
 use crate::models::{BOUNDS, mean_model};
@@ -90,7 +90,7 @@ pub fn table(
         scope.spawn(move || {
             // In any order: the counts do not depend on it. The receiver lives longer.
             numbers.into_par_iter().for_each_with(sender, |sender, number| {
-                drop(sender.send((number, posterior_of(study, number))));
+                drop(sender.send((number, compute_outcome(study, number))));
             });
         });
         for (number, drawn) in drawn {
@@ -117,7 +117,7 @@ impl Tally {
             let PosteriorSummary { quantiles: [low, _, lower, _, upper, _, high], .. } = *summary;
             counts.within_95 += u64::from((low..=high).contains(&value));
             counts.within_50 += u64::from((lower..=upper).contains(&value));
-            counts.ranks.add(below(posterior, truth, k), posterior.draws.len());
+            counts.ranks.add(count_draws_below(posterior, truth, k), posterior.draws.len());
         }
     }
 
@@ -127,7 +127,8 @@ impl Tally {
             .map(|k| {
                 format!(
                     "{:.1}",
-                    100.0 * below(posterior, truth, k) as f64 / posterior.draws.len() as f64
+                    100.0 * count_draws_below(posterior, truth, k) as f64
+                        / posterior.draws.len() as f64
                 )
             })
             .collect();
@@ -171,7 +172,7 @@ impl Tally {
     }
 }
 
-fn posterior_of(study: &PosteriorCalibration, number: u64) -> Result<TruthOutcome, StudyError> {
+fn compute_outcome(study: &PosteriorCalibration, number: u64) -> Result<TruthOutcome, StudyError> {
     let truth = mean_model(study.seed, number);
     let monte_carlo =
         model_germs(REALIZATIONS[usize::from(study.velocities >= MANY)], study.seed + number);
@@ -179,7 +180,7 @@ fn posterior_of(study: &PosteriorCalibration, number: u64) -> Result<TruthOutcom
     if !PointStatistics::from_outcomes(&monte_carlo, &truth, &modelled).feasible {
         return Ok(TruthOutcome::Unusable);
     }
-    let Some(data) = simulated(study, &truth, number)? else {
+    let Some(data) = simulate_data(study, &truth, number)? else {
         return Ok(TruthOutcome::Unusable);
     };
     let specification = specification(data, monte_carlo);
@@ -200,7 +201,7 @@ fn quantity(point: &Point, k: usize) -> f64 {
 }
 
 /// Returns the number of draws below the truth in quantity number `k`.
-fn below(posterior: &Posterior, truth: &Point, k: usize) -> usize {
+fn count_draws_below(posterior: &Posterior, truth: &Point, k: usize) -> usize {
     let truth = quantity(truth, k);
     posterior.draws.iter().filter(|draw| quantity(&draw.point, k) < truth).count()
 }

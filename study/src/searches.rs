@@ -57,7 +57,7 @@ pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, 
     let data = data(draws)?;
     for (name, start) in starts(draws.seed) {
         for method in [SearchMethod::Newton, SearchMethod::Simplex] {
-            let found = found(&start, method, data, draws)?;
+            let found = run_search(&start, method, data, draws)?;
             let mut row = vec![name.clone(), method.name().to_owned()];
             row.extend(cells(&found, data, draws)?);
             table.push(row);
@@ -88,7 +88,6 @@ fn monte_carlo(draws: &Draws) -> MonteCarlo {
     MonteCarlo { realizations: draws.realizations, seed: draws.seed, ..MonteCarlo::default() }
 }
 
-/// A completed search.
 struct CompletedSearch {
     specification: JobSpecification,
     status: Status,
@@ -108,7 +107,7 @@ impl CompletedSearch {
     }
 }
 
-fn found(
+fn run_search(
     start: &Point,
     method: SearchMethod,
     data: Moments,
@@ -159,7 +158,7 @@ fn cells(found: &CompletedSearch, data: Moments, draws: &Draws) -> Result<Vec<St
     let start = found.specification.start();
     cells.push(two_digits(Some(distance(&start, &best))));
     if found.specification.search.method == SearchMethod::Newton {
-        let nearest = nearest(&start, &best, data, draws)?;
+        let nearest = nearest_match(&start, &best, data, draws)?;
         cells.push(two_digits(nearest.map(|nearest| distance(&nearest, &best))));
     }
     Ok(cells)
@@ -170,14 +169,14 @@ const DIFFERENCE: f64 = 1e-4;
 
 /// Returns the point nearest to `start` among those that match the data by the moments linearised
 /// at `at`; `None` if they cannot be linearised.
-fn nearest(
+fn nearest_match(
     start: &Point,
     at: &Point,
     data: Moments,
     draws: &Draws,
 ) -> Result<Option<Point>, PointError> {
     let y = |u: &[f64]| -> Result<Option<[f64; 2]>, PointError> {
-        let (point, drawn) = (of_unit(u), monte_carlo(draws));
+        let (point, drawn) = (point_at(u), monte_carlo(draws));
         let estimate = statistics::estimate(&drawn, &point, &outcomes(&point, &drawn, draws.isa)?);
         Ok(estimate.map(|estimate| logarithms(estimate.moments)))
     };
@@ -199,7 +198,7 @@ fn nearest(
         let here: f64 = rows[i].iter().zip(unit).map(|(slope, u)| slope * u).sum();
         right[i] = here + target[i] - found[i];
     }
-    Ok(Some(of_unit(&newton::nearest(&to_unit(start), &rows, right))))
+    Ok(Some(point_at(&newton::nearest(&to_unit(start), &rows, right))))
 }
 
 fn logarithms(moments: Moments) -> [f64; 2] {
@@ -210,7 +209,7 @@ fn to_unit(point: &Point) -> [f64; 7] {
     std::array::from_fn(|i| (point.0[i] - BOUNDS[i].0) / (BOUNDS[i].1 - BOUNDS[i].0))
 }
 
-fn of_unit(unit: &[f64]) -> Point {
+fn point_at(unit: &[f64]) -> Point {
     let mut unit = unit.iter();
     Point::of_bone(
         BOUNDS.map(|(lower, upper)| lower + unit.next().unwrap_or(&0.0) * (upper - lower)),
@@ -239,7 +238,7 @@ mod tests {
         assert_eq!(starts.len(), 10);
         let within = starts.iter().filter(|(name, start)| {
             assert!(start.constants().elasticity().is_ok(), "{name}");
-            let found = found(start, SearchMethod::Newton, data, &draws).unwrap();
+            let found = run_search(start, SearchMethod::Newton, data, &draws).unwrap();
             assert_eq!(found.status, Status::Converged, "{name}: {:?}", found.costs);
             found.first_below(1e-10).is_some_and(|evaluations| evaluations <= 10)
         });
@@ -252,7 +251,7 @@ mod tests {
         let draws = Draws { realizations: 12, seed: 1, isa: Isa::fastest() };
         let data = data(&draws).unwrap();
         for (name, start) in starts(draws.seed).into_iter().rev().step_by(4) {
-            let found = found(&start, SearchMethod::Simplex, data, &draws).unwrap();
+            let found = run_search(&start, SearchMethod::Simplex, data, &draws).unwrap();
             assert_eq!(found.status, Status::Converged, "{name}: {:?}", found.costs.len());
             assert!(found.lowest() <= SIMPLEX_COST, "{name}: {}", found.lowest());
         }
@@ -263,6 +262,6 @@ mod tests {
         let lower = Point::of_bone(BOUNDS.map(|(lower, _)| lower));
         let upper = Point::of_bone(BOUNDS.map(|(_, upper)| upper));
         assert_eq!(distance(&lower, &upper), 7.0_f64.sqrt());
-        assert!(distance(&of_unit(&to_unit(&OPTIMUM)), &OPTIMUM) < 1e-15);
+        assert!(distance(&point_at(&to_unit(&OPTIMUM)), &OPTIMUM) < 1e-15);
     }
 }

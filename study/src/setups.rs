@@ -103,9 +103,9 @@ struct MeasuredSetup {
 /// # Errors
 /// If a mean model or dispersion has no ensemble.
 pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
-    let measured = measured(draws)?;
+    let measured = measure_setups(draws)?;
     for one in measured.iter().filter(|one| one.is_remarkable()) {
-        progress(&one.described());
+        progress(&one.describe());
     }
     let mut table = MarkdownTable::new(&[
         "length of the array (periods)",
@@ -132,11 +132,11 @@ pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, 
     Ok(table)
 }
 
-fn measured(draws: &Draws) -> Result<Vec<MeasuredSetup>, PointError> {
+fn measure_setups(draws: &Draws) -> Result<Vec<MeasuredSetup>, PointError> {
     (0..draws.realizations)
         .into_par_iter()
         .map_init(Workspace::default, |workspace, index| {
-            let drawn = drawn(draws.seed, index, &RANGES)?;
+            let drawn = draw_case(draws.seed, index, &RANGES)?;
             Ok(drawn.map(|drawn| MeasuredSetup::new(index, drawn, draws.isa, workspace)))
         })
         .filter_map(Result::transpose)
@@ -153,11 +153,12 @@ fn summary(class: &[&MeasuredSetup]) -> Vec<String> {
     let errors: Vec<f64> = class.iter().filter_map(|one| one.difference.velocity()).collect();
     let share = |count: usize| percent(count as u64, errors.len() as u64);
     cells.push(share(errors.iter().filter(|&&error| error <= WANTED).count()));
-    cells.push(share(class.iter().filter(|one| one.is_kept() == Some(true)).count()));
-    let mut stated: Vec<f64> = class.iter().filter_map(|one| one.stated(&one.found)).collect();
+    cells.push(share(class.iter().filter(|one| one.keeps_stated_errors() == Some(true)).count()));
+    let mut stated: Vec<f64> =
+        class.iter().filter_map(|one| one.stated_error(&one.found)).collect();
     stated.sort_unstable_by(f64::total_cmp);
     cells.push(two_digits(quantile(&stated, 0.5)));
-    let reference = class.iter().filter_map(|one| one.stated(&one.reference));
+    let reference = class.iter().filter_map(|one| one.stated_error(&one.reference));
     cells.push(two_digits(reference.reduce(f64::max)));
     cells
 }
@@ -182,24 +183,24 @@ impl MeasuredSetup {
     }
 
     fn is_remarkable(&self) -> bool {
-        self.difference == Difference::Picks || self.is_kept() == Some(false)
+        self.difference == Difference::Picks || self.keeps_stated_errors() == Some(false)
     }
 
     /// Returns whether the velocity is no farther from the reference than both state; `None` if it has
     /// not both.
-    fn is_kept(&self) -> Option<bool> {
+    fn keeps_stated_errors(&self) -> Option<bool> {
         let error = self.difference.velocity()?;
-        Some(error <= self.stated(&self.found)? + self.stated(&self.reference)?)
+        Some(error <= self.stated_error(&self.found)? + self.stated_error(&self.reference)?)
     }
 
     /// Returns the stated error of one of the two solutions of a case that has both.
-    fn stated(&self, outcome: &Result<Arrival, Failure>) -> Option<f64> {
+    fn stated_error(&self, outcome: &Result<Arrival, Failure>) -> Option<f64> {
         self.difference.velocity()?;
         outcome.as_ref().ok().map(|arrival| arrival.estimated_error)
     }
 
     /// Describes the case in one line.
-    fn described(&self) -> String {
+    fn describe(&self) -> String {
         let outcome = |outcome: &Result<Arrival, Failure>| match outcome {
             Ok(arrival) => {
                 format!("{:.2} m/s (± {:.0e})", arrival.velocity, arrival.estimated_error)
@@ -249,11 +250,11 @@ impl MeasuredSetup {
 /// # Errors
 /// If its mean model or dispersion has no ensemble.
 pub fn case(seed: u64, index: u64) -> Result<Option<Case>, PointError> {
-    Ok(drawn(seed, index, &RANGES)?.map(|Drawn { setup, bone, .. }| Case { setup, bone }))
+    Ok(draw_case(seed, index, &RANGES)?.map(|Drawn { setup, bone, .. }| Case { setup, bone }))
 }
 
 /// Returns the first case of `index` that passes validation and is within the limit of time.
-fn drawn(seed: u64, index: u64, ranges: &Ranges) -> Result<Option<Drawn>, PointError> {
+fn draw_case(seed: u64, index: u64, ranges: &Ranges) -> Result<Option<Drawn>, PointError> {
     let mut generator = Generator::for_index(seed, index);
     for _ in 0..TRIES_MAX {
         let (mut setup, point) = (setup(&mut generator, ranges), point(&mut generator));
@@ -286,10 +287,10 @@ fn setup(generator: &mut Generator, ranges: &Ranges) -> Setup {
     let center_frequency = generator.decades(ranges.center_frequency.0, ranges.center_frequency.1);
     let coupling = fluid(generator, ranges);
     let marrow = fluid(generator, ranges);
-    let mut within = |(from, to): (f64, f64)| generator.decades(from, to);
-    let bone_thickness = within((0.5e-3, 8e-3));
-    let (source, receivers) = (within(ranges.height), within(ranges.height));
-    let (first_x1, span) = (within(ranges.first_x1), within(ranges.span));
+    let mut draw = |(from, to): (f64, f64)| generator.decades(from, to);
+    let bone_thickness = draw((0.5e-3, 8e-3));
+    let (source, receivers) = (draw(ranges.height), draw(ranges.height));
+    let (first_x1, span) = (draw(ranges.first_x1), draw(ranges.span));
     let count = generator.between(3.0, 25.0) as u32;
     Setup {
         layers: Layers { coupling, bone_thickness, marrow, ..Layers::default() },
@@ -309,10 +310,10 @@ fn setup(generator: &mut Generator, ranges: &Ranges) -> Setup {
 }
 
 fn fluid(generator: &mut Generator, ranges: &Ranges) -> Fluid {
-    let mut within = |(from, to): (f64, f64)| generator.decades(from, to);
+    let mut draw = |(from, to): (f64, f64)| generator.decades(from, to);
     Fluid {
-        thickness: within(ranges.fluid_thickness),
-        density: within(ranges.fluid_density),
+        thickness: draw(ranges.fluid_thickness),
+        density: draw(ranges.fluid_density),
         sound_speed: generator.between(1000.0, 2000.0),
         attenuation: Attenuation::default(),
     }
@@ -320,10 +321,10 @@ fn fluid(generator: &mut Generator, ranges: &Ranges) -> Fluid {
 
 fn attenuate(layers: &mut Layers, generator: &mut Generator, factors: [(f64, f64); 2]) {
     let [bone, fluids] = factors;
-    let mut drawn = |(from, to)| Some(generator.decades(from, to));
-    layers.bone_attenuation.quality_factor = drawn(bone);
-    layers.coupling.attenuation.quality_factor = drawn(fluids);
-    layers.marrow.attenuation.quality_factor = drawn(fluids);
+    let mut draw = |(from, to)| Some(generator.decades(from, to));
+    layers.bone_attenuation.quality_factor = draw(bone);
+    layers.coupling.attenuation.quality_factor = draw(fluids);
+    layers.marrow.attenuation.quality_factor = draw(fluids);
 }
 
 /// Half of the means are the optimum's, made stiffer or softer; half are isotropic.
@@ -367,7 +368,7 @@ mod tests {
     };
 
     fn outcome(index: u64, difference: Difference) -> MeasuredSetup {
-        let drawn = drawn(1, index, &LONG_ARRAYS).unwrap().unwrap();
+        let drawn = draw_case(1, index, &LONG_ARRAYS).unwrap().unwrap();
         let failure = osteon_common::outcome::FailureKind::NoArrival;
         let arrival = Err(Failure { kind: failure, detail: String::new() });
         MeasuredSetup { index, drawn, found: arrival.clone(), reference: arrival, difference }
@@ -389,7 +390,7 @@ mod tests {
         for (difference, told) in [(Difference::BothFailed, false), (Difference::Picks, true)] {
             assert_eq!(outcome(3, difference).is_remarkable(), told, "{difference:?}");
         }
-        let text = outcome(3, Difference::Picks).described();
+        let text = outcome(3, Difference::Picks).describe();
         assert!(
             text.starts_with("case 3: no_arrival against no_arrival at refinement 5; plate"),
             "{text}"
@@ -401,12 +402,12 @@ mod tests {
     #[test]
     fn near_arrays_at_low_frequencies_and_thin_plates_are_right() {
         for index in [53, 101, 111, 149, 173, 177, 381] {
-            let drawn = drawn(1, index, &LONG_ARRAYS).unwrap().unwrap();
+            let drawn = draw_case(1, index, &LONG_ARRAYS).unwrap().unwrap();
             let one = MeasuredSetup::new(index, drawn, Isa::fastest(), &mut Workspace::default());
             let error = one.difference.velocity();
             // The error cannot be smaller than that of the reference itself.
             let bound = one.reference.as_ref().map_or(0.0, |found| found.estimated_error).max(2e-4);
-            assert!(error.is_some_and(|error| error < bound), "{error:?}: {}", one.described());
+            assert!(error.is_some_and(|error| error < bound), "{error:?}: {}", one.describe());
         }
     }
 
@@ -415,12 +416,13 @@ mod tests {
         let mut workspace = Workspace::default();
         let mut counts = [0; 2];
         for index in 0..30 {
-            let drawn = drawn(2, index, &RANGES).unwrap().unwrap();
+            let drawn = draw_case(2, index, &RANGES).unwrap().unwrap();
             let one = MeasuredSetup::new(index, drawn, Isa::fastest(), &mut workspace);
             let Some(error) = one.difference.velocity() else { continue };
-            let stated = one.stated(&one.found).unwrap() + one.stated(&one.reference).unwrap();
-            assert!(error <= 2.0 * stated, "{error:e}: {}", one.described());
-            counts[usize::from(one.is_kept().unwrap())] += 1;
+            let stated =
+                one.stated_error(&one.found).unwrap() + one.stated_error(&one.reference).unwrap();
+            assert!(error <= 2.0 * stated, "{error:e}: {}", one.describe());
+            counts[usize::from(one.keeps_stated_errors().unwrap())] += 1;
         }
         assert!(counts[1] >= 8 && counts[0] <= 1, "{counts:?}");
     }

@@ -82,13 +82,13 @@ pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, 
     ]);
     let mut candidates = 0..;
     for (set, &searched) in (0..twins.repetitions).zip(SEARCHED.iter().cycle()) {
-        let (truth, data) = drawn_set(twins, searched, &mut candidates)?;
+        let (truth, data) = draw_set(twins, searched, &mut candidates)?;
         let specification = specification(&truth, searched, data, twins.seed);
-        let found = found(&specification, &mut RealizationCache::new(), twins.isa)?;
+        let found = identify_data(&specification, &mut RealizationCache::new(), twins.isa)?;
         let mut row = vec![(set + 1).to_string(), searched.name().replace('_', " ")];
         for parameter in [searched, Parameter::Dispersion] {
             let quantity = found.as_ref().and_then(|found| quantity_of(found, parameter));
-            let (truth, quantity) = (truth.get(parameter), quantity);
+            let truth = truth.get(parameter);
             row.push(format!("{truth:.5e}"));
             row.push(quantity.map_or("–".to_owned(), |found| format!("{:.5e}", found.value)));
             row.push(two_digits(quantity.and_then(|found| errors(&found, truth))));
@@ -106,13 +106,13 @@ pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, 
 /// If a point has no ensemble.
 pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let usual = Surroundings::default();
-    let counts = Counts::over_data_sets(twins, &usual, &usual, progress)?;
+    let counts = Counts::count_over_data_sets(twins, &usual, &usual, progress)?;
     let mut table = MarkdownTable::new(&COUNTED_COLUMNS);
     counts.rows().into_iter().for_each(|row| table.push(row));
     Ok(table)
 }
 
-/// The same for bones of a population: thicknesses of 4 ± 0.5 mm and quality factors of 15 ± 2, a
+/// As [`coverage`], but for bones of a population: thicknesses of 4 ± 0.5 mm and quality factors of 15 ± 2, a
 /// coupling of 1500 ± 15 m/s, and a probe's tilt of 0 ± 0.5°. The model knows these laws, or takes the
 /// means for all bones.
 ///
@@ -124,7 +124,7 @@ pub fn populations(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownT
     let population = population();
     let means = Surroundings { random: RandomQuantities::default(), ..population };
     for (model, name) in [(&population, "those of the data"), (&means, "none")] {
-        let counts = Counts::over_data_sets(twins, &population, model, progress)?;
+        let counts = Counts::count_over_data_sets(twins, &population, model, progress)?;
         for row in counts.rows() {
             table.push([vec![name.to_owned()], row].concat());
         }
@@ -162,8 +162,9 @@ struct Counts {
 }
 
 impl Counts {
-    /// Counts over data sets that are made in some surroundings, and identified by a model in others.
-    fn over_data_sets(
+    /// Counts over data sets that are made in the surroundings `data`, and identified by a model in the
+    /// surroundings `model`.
+    fn count_over_data_sets(
         twins: &Twins,
         data: &Surroundings,
         model: &Surroundings,
@@ -175,8 +176,8 @@ impl Counts {
         for repetition in 0..twins.repetitions {
             let seed = data_seed(twins.seed, repetition);
             let velocities = data.velocities(&OPTIMUM, COUNTED, seed, twins.isa)?;
-            let specification = counted_specification(model, velocities, twins.seed);
-            let found = found(&specification, &mut known, twins.isa)?;
+            let specification = two_parameter_specification(model, velocities, twins.seed);
+            let found = identify_data(&specification, &mut known, twins.isa)?;
             let quantities = found.map(|found| [found.bulk_velocity, found.dispersion]);
             for (i, quantity) in quantities.iter().flatten().enumerate() {
                 let Some(Uncertainty { interval: [lower, upper], .. }) = quantity.known else {
@@ -207,7 +208,7 @@ impl Counts {
 
 /// Returns a specification in which e_L and the dispersion are free, with the same start for all data
 /// sets, different from the truth.
-fn counted_specification(
+fn two_parameter_specification(
     model: &Surroundings,
     velocities: Vec<f64>,
     seed: u64,
@@ -222,7 +223,7 @@ fn counted_specification(
 
 /// Returns the next parameter set for which enough velocities can be computed, with these
 /// velocities.
-fn drawn_set(
+fn draw_set(
     twins: &Twins,
     searched: Parameter,
     candidates: &mut impl Iterator<Item = u64>,
@@ -233,7 +234,7 @@ fn drawn_set(
         let (lower, upper) = BOUNDS[Parameter::Dispersion as usize];
         let share = (point.dispersion() - lower) / (upper - lower);
         point.0[Parameter::Dispersion as usize] = 0.05 + 0.15 * share;
-        if let Some([(lower, upper), _]) = of_setup(searched) {
+        if let Some([(lower, upper), _]) = setup_ranges(searched) {
             let share = Generator::for_index(twins.seed, number).between(0.0, 1.0);
             point.0[searched as usize] = lower + share * (upper - lower);
         }
@@ -248,7 +249,7 @@ fn drawn_set(
 }
 
 /// Returns the truths and the bounds of a parameter of the setup.
-fn of_setup(parameter: Parameter) -> Option<[(f64, f64); 2]> {
+fn setup_ranges(parameter: Parameter) -> Option<[(f64, f64); 2]> {
     match parameter {
         Parameter::BoneThickness => Some(THICKNESSES),
         Parameter::BoneQualityFactor => Some(QUALITY_FACTORS),
@@ -257,7 +258,7 @@ fn of_setup(parameter: Parameter) -> Option<[(f64, f64); 2]> {
 }
 
 fn bounds(parameter: Parameter) -> (f64, f64) {
-    of_setup(parameter).map_or_else(|| BOUNDS[parameter as usize], |[_, bounds]| bounds)
+    setup_ranges(parameter).map_or_else(|| BOUNDS[parameter as usize], |[_, bounds]| bounds)
 }
 
 /// Returns the paper's geometry; with attenuation if its quality factor is searched.
@@ -288,7 +289,7 @@ fn specification(
     };
     let range = |parameter: Parameter| match parameter {
         Parameter::Dispersion => middle(parameter),
-        _ if parameter == searched => start_within(parameter, truth, middle(parameter)),
+        _ if parameter == searched => start_between(parameter, truth, middle(parameter)),
         _ => Range::Fixed(truth.get(parameter)),
     };
     JobSpecification {
@@ -312,7 +313,7 @@ fn specification(
 
 /// Returns the middle of the bounds, or, if that is not admissible together with the fixed
 /// parameters, a value slightly below the truth.
-fn start_within(parameter: Parameter, truth: &Point, middle: Range) -> Range {
+fn start_between(parameter: Parameter, truth: &Point, middle: Range) -> Range {
     let mut point = *truth;
     point.0[parameter as usize] = middle.start();
     if point.constants().elasticity().is_ok() {
@@ -326,7 +327,7 @@ fn free(parameter: Parameter, start: f64) -> Range {
     Range::Free { start: start.clamp(lower, upper), lower, upper }
 }
 
-fn found(
+fn identify_data(
     specification: &JobSpecification,
     known: &mut RealizationCache,
     isa: Isa,

@@ -9,7 +9,7 @@ use osteon_common::results::{Estimate, Moments};
 use osteon_common::statistics;
 use osteon_solver::{Isa, Solver};
 
-use crate::draws::{OPTIMUM, solved};
+use crate::draws::{OPTIMUM, solve_realizations};
 use crate::table::{MarkdownTable, two_digits};
 use crate::{RowCallback, StudyError};
 
@@ -111,7 +111,7 @@ pub fn scatter(
     for seed in repetitions.first..repetitions.first + repetitions.seeds {
         let plain = MonteCarlo { realizations, seed, sampling, scrambles, ..MonteCarlo::default() };
         let ensemble = Ensemble::drawn(point, plain.germs())?;
-        let solved = solved(&solver, &ensemble, realizations);
+        let solved = solve_realizations(&solver, &ensemble, realizations);
         let outcomes: Vec<_> = solved.into_iter().map(|one| one.outcome).collect();
         failed += outcomes.iter().filter(|outcome| outcome.is_err()).count();
         for (estimates, control_variate) in estimates.iter_mut().zip([false, true]) {
@@ -124,7 +124,7 @@ pub fn scatter(
 
 impl SeedScatter {
     fn new(estimates: &[Estimate], failed: usize) -> Self {
-        let of = |moment: fn(&Moments) -> f64| {
+        let spread_of = |moment: fn(&Moments) -> f64| {
             let values = || estimates.iter().map(|estimate| moment(&estimate.moments));
             let mean = values().sum::<f64>() / estimates.len() as f64;
             let squares: f64 = values().map(|value| (value - mean) * (value - mean)).sum();
@@ -133,8 +133,8 @@ impl SeedScatter {
             let deviation = (squares / (estimates.len() as f64 - 1.0)).sqrt();
             (deviation, (error_squares / estimates.len() as f64).sqrt())
         };
-        let mean = of(|moments| moments.mean);
-        let variation = of(|moments| moments.coefficient_of_variation);
+        let mean = spread_of(|moments| moments.mean);
+        let variation = spread_of(|moments| moments.coefficient_of_variation);
         let moments = |mean, coefficient_of_variation| Moments { mean, coefficient_of_variation };
         Self {
             deviation: moments(mean.0, variation.0),
@@ -145,13 +145,13 @@ impl SeedScatter {
 }
 
 fn cells(found: &SeedScatter, plain: &SeedScatter) -> Vec<String> {
-    let of = |moment: fn(&Moments) -> f64| {
+    let spread_of = |moment: fn(&Moments) -> f64| {
         let deviation = moment(&found.deviation);
         let ratio = moment(&plain.deviation) / deviation;
         [deviation, ratio * ratio, moment(&found.reported) / deviation]
     };
-    let mean = of(|moments| moments.mean);
-    let variation = of(|moments| moments.coefficient_of_variation);
+    let mean = spread_of(|moments| moments.mean);
+    let variation = spread_of(|moments| moments.coefficient_of_variation);
     mean.into_iter().chain(variation).map(|number| two_digits(Some(number))).collect()
 }
 
@@ -185,9 +185,9 @@ mod tests {
     /// Checks the statement of the documentation about 1024 points.
     #[test]
     fn sobol_points_are_worth_a_thousand_times_their_number() {
-        let of = |sampling| scatter(&OPTIMUM, 1024, sampling, 1, &REPETITIONS()).unwrap();
-        let [plain, controlled] = of(Sampling::MonteCarlo);
-        let [sobol, both] = of(Sampling::Sobol);
+        let spread_of = |sampling| scatter(&OPTIMUM, 1024, sampling, 1, &REPETITIONS()).unwrap();
+        let [plain, controlled] = spread_of(Sampling::MonteCarlo);
+        let [sobol, both] = spread_of(Sampling::Sobol);
         let check = |found: &SeedScatter, least: [f64; 2], what: &str| {
             let gain = gain(found, &plain);
             assert!(gain[0] > least[0] && gain[1] > least[1], "{what}: {gain:?}");

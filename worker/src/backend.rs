@@ -42,18 +42,15 @@ pub(crate) struct Task {
 pub(crate) enum Computed {
     /// All realizations are computed, in index order.
     Complete {
-        /// The realizations.
         solved: Vec<RealizationResult>,
         /// Wall time of the computation, s.
         elapsed_s: f64,
     },
     /// The computation was interrupted because the batch was released.
     Abandoned,
-    /// The computation panicked.
     Panicked {
         /// The realization at which it panicked.
         case: Box<PanickedCase>,
-        /// The panic's message.
         message: String,
     },
 }

@@ -19,17 +19,16 @@ pub(crate) struct Backoff {
 }
 
 impl Backoff {
-    /// Returns the next wait.
-    pub(crate) fn next(&mut self) -> Duration {
+    pub(crate) fn next_wait(&mut self) -> Duration {
         // Without random numbers the wait is merely shorter.
-        self.next_with(random_number().unwrap_or_default())
+        self.next_wait_with(random_number().unwrap_or_default())
     }
 
     /// Returns the wait after a refusal by a coordinator that states when to come back: that time,
     /// and at random up to half as much again, so that those who were refused together do not all
     /// come back together.
-    pub(crate) fn stated(delay: Duration) -> Duration {
-        Self::stated_with(delay, random_number().unwrap_or_default())
+    pub(crate) fn wait_after_refusal(delay: Duration) -> Duration {
+        Self::wait_after_refusal_with(delay, random_number().unwrap_or_default())
     }
 
     /// Resets to the shortest wait.
@@ -37,12 +36,12 @@ impl Backoff {
         self.failures = 0;
     }
 
-    fn stated_with(delay: Duration, random: u64) -> Duration {
+    fn wait_after_refusal_with(delay: Duration, random: u64) -> Duration {
         let delay = delay.min(Duration::from_millis(STATED_MS_MAX));
         delay + Duration::from_millis(random % (delay.as_millis() as u64 / 2 + 1))
     }
 
-    fn next_with(&mut self, random: u64) -> Duration {
+    fn next_wait_with(&mut self, random: u64) -> Duration {
         let full = FIRST_MS.saturating_mul(1 << self.failures.min(16)).min(LONGEST_MS);
         self.failures = self.failures.saturating_add(1);
         Duration::from_millis(full / 2 + random % (full / 2 + 1))
@@ -57,14 +56,14 @@ mod tests {
     fn waits_double_up_to_the_bound() {
         let waits = |random| {
             let mut backoff = Backoff::default();
-            let mut next = || backoff.next_with(random).as_millis();
+            let mut next = || backoff.next_wait_with(random).as_millis();
             [next(), next(), next(), next(), next(), next(), next(), next()]
         };
         assert_eq!(waits(0), [50, 100, 200, 400, 800, 1600, 2500, 2500]);
         assert_eq!(waits(u64::MAX)[0], 50 + u128::from(u64::MAX % 51));
         for _ in 0..100 {
             let mut backoff = Backoff { failures: u32::MAX };
-            let wait = backoff.next().as_millis();
+            let wait = backoff.next_wait().as_millis();
             assert!((2500..=5000).contains(&wait), "{wait} ms");
         }
     }
@@ -79,18 +78,18 @@ mod tests {
             (1_000_000, 150_000, 450_000),
             (u64::MAX, 0, 300_000),
         ] {
-            let wait = Backoff::stated_with(Duration::from_secs(stated_s), random);
+            let wait = Backoff::wait_after_refusal_with(Duration::from_secs(stated_s), random);
             assert_eq!(wait, Duration::from_millis(expected_ms), "{stated_s} s, {random}");
         }
-        assert!(Backoff::stated(Duration::from_secs(1)) >= Duration::from_secs(1));
+        assert!(Backoff::wait_after_refusal(Duration::from_secs(1)) >= Duration::from_secs(1));
     }
 
     #[test]
     fn a_success_begins_again() {
         let mut backoff = Backoff::default();
-        backoff.next();
-        backoff.next();
+        backoff.next_wait();
+        backoff.next_wait();
         backoff.reset();
-        assert_eq!(backoff.next_with(0).as_millis(), 50);
+        assert_eq!(backoff.next_wait_with(0).as_millis(), 50);
     }
 }

@@ -28,7 +28,7 @@ impl BatchSpans {
     }
 
     /// Sees an event before the reaction to it.
-    pub(crate) fn before(&mut self, event: &Event, now: SystemTime) {
+    pub(crate) fn observe(&mut self, event: &Event, now: SystemTime) {
         self.arrived = None;
         match event {
             Event::Message(message) => {
@@ -40,7 +40,7 @@ impl BatchSpans {
                 if let Some((context, count)) = self.held.remove(task)
                     && let Computed::Complete { elapsed_s, .. } = computed
                 {
-                    self.computed(context, count, *elapsed_s, now);
+                    self.record(context, count, *elapsed_s, now);
                 }
             }
             _ => {}
@@ -48,20 +48,20 @@ impl BatchSpans {
     }
 
     /// Notes that a batch is computed.
-    pub(crate) fn begun(&mut self, task: Task, work: &Work) {
+    pub(crate) fn begin(&mut self, task: Task, work: &Work) {
         if let Some(context) = self.arrived.take() {
             self.held.insert(task, (context, work.count));
         }
     }
 
     /// Notes that a batch is abandoned.
-    pub(crate) fn abandoned(&mut self, task: Task) {
+    pub(crate) fn abandon(&mut self, task: Task) {
         self.held.remove(&task);
     }
 
     /// Records a computation; the time before it, in which the batch waited, belongs to the
     /// coordinator's span alone.
-    fn computed(&self, parent: TraceContext, count: u32, elapsed_s: f64, now: SystemTime) {
+    fn record(&self, parent: TraceContext, count: u32, elapsed_s: f64, now: SystemTime) {
         let elapsed = Duration::try_from_secs_f64(elapsed_s).unwrap_or_default();
         let start = now.checked_sub(elapsed).unwrap_or(now);
         if let Some(mut span) = OpenSpan::begin("osteon.compute", Some(parent), start) {

@@ -84,11 +84,11 @@ pub async fn run(
         "starting"
     );
     let backend = Box::new(Cores::new(config.threads, config.isa)?);
-    run_on(backend, config, shutdown).await
+    run_on_backend(backend, config, shutdown).await
 }
 
-/// Same as [`run`], on a given device.
-async fn run_on(
+/// As [`run`], on the computing device `backend`.
+async fn run_on_backend(
     backend: Box<dyn Backend>,
     config: WorkerConfig,
     shutdown: impl Future<Output = ()>,
@@ -184,7 +184,7 @@ impl Worker {
                 let (endpoint, seconds) = (self.endpoint.clone(), away.as_secs_f64().round());
                 return Err(WorkerError::GaveUp { endpoint, seconds, last });
             }
-            let wait = stated.map_or_else(|| backoff.next(), Backoff::stated);
+            let wait = stated.map_or_else(|| backoff.next_wait(), Backoff::wait_after_refusal);
             let wait = wait.min(left.unwrap_or(Duration::MAX));
             let wait_ms = wait.as_millis() as u64;
             warn!(endpoint = %self.endpoint, wait_ms, reason = last, "reconnecting");
@@ -227,7 +227,7 @@ impl Worker {
             }
             Err(OpenError::Unreachable(reason)) => return Ok(End::Lost(reason)),
             Err(OpenError::Distrust(failure)) => return self.on_tls_failure(failure),
-            Err(OpenError::Status(status)) => return self.ended_with(&status),
+            Err(OpenError::Status(status)) => return self.interpret_end(&status),
         };
         let mut ticks = interval(Duration::from_millis(TICK_MS));
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
@@ -244,7 +244,7 @@ impl Worker {
                     Ok(Some(AttachResponse { message: Some(message) })) => Event::Message(Box::new(message)),
                     Ok(Some(AttachResponse { message: None })) => continue,
                     Ok(None) => return Ok(End::Lost("the coordinator closed the stream".to_owned())),
-                    Err(status) => return self.ended_with(&status),
+                    Err(status) => return self.interpret_end(&status),
                 },
                 () = leave.as_mut(), if !draining => {
                     draining = true;
@@ -258,7 +258,7 @@ impl Worker {
             }
             let ended = self.apply(event, Some(&outbox))?;
             if !was_draining && self.state.is_draining() {
-                let by = self.drained_by(draining);
+                let by = self.drain_reason(draining);
                 info!(by, "draining: answering the batches in hand, then leaving");
             }
             if let Some(end) = ended {
@@ -279,7 +279,7 @@ impl Worker {
     }
 
     /// Returns who makes this worker drain; `asked` if its user or its time limit does.
-    fn drained_by(&self, asked: bool) -> &'static str {
+    fn drain_reason(&self, asked: bool) -> &'static str {
         match asked {
             true => "this machine",
             false if self.state.is_idle_too_long(self.started.elapsed()) => "the idle timeout",
@@ -298,7 +298,7 @@ impl Worker {
         }
         trace!(?event, "event");
         if let Some(spans) = &mut self.spans {
-            spans.before(&event, SystemTime::now());
+            spans.observe(&event, SystemTime::now());
         }
         let mut end = None;
         for effect in self.state.react(self.started.elapsed(), event) {
@@ -311,7 +311,7 @@ impl Worker {
                 }
                 Effect::Compute(task, work) => {
                     if let Some(spans) = &mut self.spans {
-                        spans.begun(task, &work);
+                        spans.begin(task, &work);
                     }
                     let sender = self.finished_sender.clone();
                     let done = move |computed| {
@@ -322,20 +322,20 @@ impl Worker {
                 }
                 Effect::Abandon(task) => {
                     if let Some(spans) = &mut self.spans {
-                        spans.abandoned(task);
+                        spans.abandon(task);
                     }
                     self.backend.forget(task);
                 }
-                Effect::Detach(why) => end = Some(End::Lost(detached(why).to_owned())),
+                Effect::Detach(why) => end = Some(End::Lost(detachment_text(why).to_owned())),
                 Effect::Leave => return Ok(Some(End::Left)),
-                Effect::Fail(failure) => return Err(self.failed(failure)),
+                Effect::Fail(failure) => return Err(self.failure_error(failure)),
             }
         }
         Ok(end)
     }
 
     /// Interprets a status: some codes are a final refusal, all others a lost connection.
-    fn ended_with(&mut self, status: &Status) -> Result<End, WorkerError> {
+    fn interpret_end(&mut self, status: &Status) -> Result<End, WorkerError> {
         // Only errors of the transport have a source, so one without was sent by a coordinator.
         self.ever_answered |= std::error::Error::source(status).is_none();
         if let Some(failure) = TlsFailure::find_cause(status) {
@@ -374,7 +374,7 @@ impl Worker {
         Err(WorkerError::Distrust { endpoint, failure })
     }
 
-    fn failed(&self, failure: Failure) -> WorkerError {
+    fn failure_error(&self, failure: Failure) -> WorkerError {
         match failure {
             Failure::Malformed(source) => {
                 WorkerError::Malformed { endpoint: self.endpoint.clone(), source }
@@ -427,7 +427,7 @@ async fn close(outbox: mpsc::Sender<AttachRequest>, responses: &mut Streaming<At
     drop(timeout(Duration::from_secs(1), drained).await);
 }
 
-fn detached(why: Detached) -> &'static str {
+fn detachment_text(why: Detached) -> &'static str {
     match why {
         Detached::Silence => "the coordinator was silent for too long",
         Detached::Overrun => "the coordinator sent too many batches, or one twice",

@@ -46,7 +46,6 @@ pub(crate) struct Identity {
 pub(crate) enum Event {
     /// The coordinator sent a message.
     Message(Box<Response>),
-    /// A computation ended.
     Computed(Task, Computed),
     /// The stream of the attachment ended.
     Lost,
@@ -61,9 +60,7 @@ pub(crate) enum Event {
 pub(crate) enum Effect {
     /// Send this message to the coordinator.
     Send(Request),
-    /// Start a computation.
     Compute(Task, Work),
-    /// Stop a computation.
     Abandon(Task),
     /// Close the stream and attach again.
     Detach(Detached),
@@ -89,11 +86,9 @@ pub(crate) enum Detached {
 pub(crate) enum Failure {
     /// The coordinator sent a batch or an evaluation that cannot be read.
     Malformed(Malformed),
-    /// The solver panicked.
     Panicked {
         /// The realization at which it panicked.
         case: Box<PanickedCase>,
-        /// The panic's message.
         message: String,
     },
 }

@@ -10,7 +10,7 @@ use anyhow::{Context as _, Result, bail};
 use crate::places::{programs, root};
 use crate::process::cargo;
 use crate::terminal::say;
-use crate::tools::installed;
+use crate::tools::install;
 
 /// The version of mdBook that builds the book.
 const VERSION: &str = "0.5.4";
@@ -32,7 +32,7 @@ pub(crate) fn build(words: &[String]) -> Result<()> {
             .with_context(|| format!("cannot create {}", directory.display()))?;
     }
     copy_pages(&root().join("docs"), &source)?;
-    let program = installed("mdbook", VERSION, OPTIONS)?;
+    let program = install("mdbook", VERSION, OPTIONS)?;
     cargo(Command::new(program).arg("build").arg(&source).arg("--dest-dir").arg(&html))?;
     let (pages, links) = check_links(&html)?;
     say(&format!("{pages} pages, {links} links: {}", html.join("index.html").display()))
@@ -114,7 +114,6 @@ fn check_links(html: &Path) -> Result<(usize, usize)> {
     Ok((pages.len(), count))
 }
 
-/// Returns the values of an attribute.
 fn values<'a>(html: &'a str, attribute: &str) -> impl Iterator<Item = &'a str> {
     let begin = format!(" {attribute}=\"");
     let mut rest = html;

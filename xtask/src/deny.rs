@@ -10,7 +10,7 @@ use anyhow::{Context as _, Result, bail};
 use crate::places::root;
 use crate::process::cargo;
 use crate::terminal::announce;
-use crate::tools::installed;
+use crate::tools::install;
 
 /// The version of cargo-deny for which the rules are written.
 const VERSION: &str = "0.20.2";
@@ -24,22 +24,22 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
     if !words.is_empty() {
         bail!("usage: cargo xtask lint deny");
     }
-    let program = installed("cargo-deny", VERSION, &[])?;
+    let program = install("cargo-deny", VERSION, &[])?;
     let deny = |arguments: &[&str]| {
         let mut command = Command::new(&program);
         command.args(arguments).current_dir(root());
         command
     };
     cargo(&mut deny(&["check", "licenses", "bans", "sources"]))?;
-    if is_fetched(&mut deny(&["fetch", "db"]))? {
+    if fetch_database(&mut deny(&["fetch", "db"]))? {
         return cargo(&mut deny(&["check", "--disable-fetch", "advisories"]));
     }
     eprintln!("advisories are not checked: their database cannot be had from here");
     Ok(())
 }
 
-/// Returns whether the advisory database could be fetched in time.
-fn is_fetched(command: &mut Command) -> Result<bool> {
+/// Fetches the advisory database; returns whether that succeeded in time.
+fn fetch_database(command: &mut Command) -> Result<bool> {
     announce(command);
     let mut child =
         command.stderr(Stdio::null()).spawn().with_context(|| format!("cannot run {command:?}"))?;

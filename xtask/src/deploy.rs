@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result};
 
 use crate::places::{programs, root};
 use crate::process::{cargo, cargo_command};
-use crate::tools::installed;
+use crate::tools::install;
 
 /// The version of cargo-deb that builds the package.
 const CARGO_DEB: &str = "3.8.0";
@@ -19,7 +19,7 @@ const CARGO_DEB: &str = "3.8.0";
 pub(crate) fn check(words: &[String]) -> Result<()> {
     cargo(&mut cargo_command(&["build", "--bin", "osteon"]))?;
     // Without optimisation it builds in a third of the time, and one package is made soon enough.
-    let cargo_deb = installed("cargo-deb", CARGO_DEB, &["--debug", "--no-default-features"])?;
+    let cargo_deb = install("cargo-deb", CARGO_DEB, &["--debug", "--no-default-features"])?;
     let programs = programs()?;
     let python = env::var_os("PYTHON").unwrap_or_else(|| OsString::from("python3"));
     let mut command = Command::new(python);

@@ -15,7 +15,7 @@ const TESTS: [&str; 5] = ["test", "--workspace", "--tests", "--", "on_random_cas
 /// The environment variable that sets their seed.
 const SEED_VARIABLE: &str = "OSTEON_TEST_SEED";
 
-/// The request in `words`.
+/// What the words of the command ask for.
 #[derive(Debug, PartialEq)]
 struct RandomTestArguments {
     duration: Duration,

@@ -38,7 +38,7 @@ pub(crate) fn rewrite(named: &[String]) -> Result<()> {
             cargo_command(&["run", "--quiet", "--release", "--package", "osteon-study", "--"]);
         run.args(command.split(' '));
         let table = output(&mut run)?;
-        fs::write(&path, replaced(&read()?, command, &table)?)
+        fs::write(&path, replace_table(&read()?, command, &table)?)
             .with_context(|| format!("cannot write {PAGE}"))?;
     }
     Ok(())
@@ -56,7 +56,7 @@ fn commands(page: &str) -> Result<Vec<String>> {
 }
 
 /// Returns the page with the table of `command` replaced.
-fn replaced(page: &str, command: &str, table: &str) -> Result<String> {
+fn replace_table(page: &str, command: &str, table: &str) -> Result<String> {
     let start = format!("{START}{command}{START_END}");
     let split = page.split_once(&start).and_then(|(before, rest)| {
         let (_, after) = rest.split_once(END)?;
@@ -78,14 +78,14 @@ mod tests {
     #[test]
     fn one_table_is_replaced_and_all_else_is_kept() {
         assert_eq!(commands(PAGE).unwrap(), ["x", "y --seed 2"]);
-        let page = replaced(PAGE, "x", "| new |\n").unwrap();
+        let page = replace_table(PAGE, "x", "| new |\n").unwrap();
         let expected = "a\n<!-- table: x -->\n\n| new |\n\n<!-- end -->\nb\n\
                         <!-- table: y --seed 2 -->\n<!-- end -->\n";
         assert_eq!(page, expected);
-        assert_eq!(replaced(&page, "x", "| new |").unwrap(), expected);
-        let page = replaced(&page, "y --seed 2", "| y |").unwrap();
+        assert_eq!(replace_table(&page, "x", "| new |").unwrap(), expected);
+        let page = replace_table(&page, "y --seed 2", "| y |").unwrap();
         assert!(page.contains("| new |") && page.ends_with("\n| y |\n\n<!-- end -->\n"));
-        assert!(replaced(PAGE, "z", "").is_err());
+        assert!(replace_table(PAGE, "z", "").is_err());
     }
 
     #[test]
@@ -98,7 +98,7 @@ mod tests {
         let page = fs::read_to_string(root().join(super::PAGE)).unwrap();
         let commands = commands(&page).unwrap();
         assert!(commands.len() > 5, "{commands:?}");
-        let made = |command: &String| page.contains(&format!("\n`osteon-study {command}"));
-        assert!(commands.iter().all(made), "{commands:?}");
+        let is_made = |command: &String| page.contains(&format!("\n`osteon-study {command}"));
+        assert!(commands.iter().all(is_made), "{commands:?}");
     }
 }

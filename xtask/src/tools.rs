@@ -8,9 +8,9 @@ use anyhow::Result;
 use crate::places::programs;
 use crate::process::{cargo, cargo_command};
 
-/// Returns the path of a program of crates.io of this version, which is installed below the target
-/// directory, with these options of `cargo install`, unless it is there.
-pub(crate) fn installed(name: &str, version: &str, options: &[&str]) -> Result<PathBuf> {
+/// Installs this version of a program of crates.io below the target directory, with these options of
+/// `cargo install`, unless it is there. Returns its path.
+pub(crate) fn install(name: &str, version: &str, options: &[&str]) -> Result<PathBuf> {
     let tools = programs()?.with_file_name("tools");
     let program = tools.join("bin").join(name);
     let present = Command::new(&program).arg("--version").output().is_ok_and(|output| {

@@ -17,8 +17,8 @@ use crate::listener::Silent;
 
 #[test]
 fn an_answer_is_told_from_a_loss() {
-    let peer = Peer::new(&at("unix:a".parse().unwrap()), Arc::new(Silent));
-    let shown = |status: &Status| peer.refused(status).to_string();
+    let peer = Peer::new(&remote_at("unix:a".parse().unwrap()), Arc::new(Silent));
+    let shown = |status: &Status| peer.interpret_refusal(status).to_string();
     let answered = Status::unavailable("the store is full");
     assert_eq!(shown(&answered), "the coordinator at unix:a is unavailable: the store is full");
     for mut broken in [Status::unavailable("reset"), Status::internal("reset")] {
@@ -34,7 +34,7 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
     let directory = tempfile::tempdir().unwrap();
     let socket = directory.path().join("socket");
     let endpoint = Endpoint::Unix(socket.clone());
-    let remote = at(endpoint);
+    let remote = remote_at(endpoint);
     let begun = Instant::now();
     let error = connect(&remote).await.unwrap_err().to_string();
     assert!(error.contains("cannot reach") && error.contains("socket"), "{error}");
@@ -50,10 +50,10 @@ async fn a_coordinator_that_is_not_there_is_waited_for_but_not_for_ever() {
 }
 
 fn remote(socket: &Path) -> Remote {
-    at(Endpoint::Unix(socket.to_owned()))
+    remote_at(Endpoint::Unix(socket.to_owned()))
 }
 
-fn at(endpoint: Endpoint) -> Remote {
+fn remote_at(endpoint: Endpoint) -> Remote {
     Remote::at(endpoint)
 }
 
@@ -165,7 +165,7 @@ async fn tls_is_thought_of_only_where_no_answer_ever_came() {
             }
         }
     });
-    let remote = at(endpoint);
+    let remote = remote_at(endpoint);
     let mut before = connect(&remote).await.unwrap();
     before.list().await.unwrap();
     broken.notify_one();

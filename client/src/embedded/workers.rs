@@ -25,7 +25,7 @@ pub const BAD_MACHINE: u8 = 77;
 /// Time after which a worker ends by itself if it has lost this process, s.
 const GIVE_UP_AFTER_S: u64 = 5;
 /// Maximum number of consecutive deaths of one worker without progress of the run in between.
-/// Deaths of other workers do not count, so all workers may be killed at once.
+/// Deaths of other workers do not count, so killing all workers at once does not end the run.
 const DEATHS_IN_A_ROW_MAX: u32 = 10;
 /// Pause before a worker is restarted, ms, multiplied by the number of consecutive deaths.
 const RESPAWN_MS: u64 = 50;
@@ -41,7 +41,7 @@ pub(super) struct Workers {
     tasks: JoinSet<()>,
     stop: watch::Sender<bool>,
     failures: mpsc::Receiver<anyhow::Error>,
-    /// Nothing is reported of the workers any more.
+    /// Whether nothing is reported of the workers any more.
     muted: Arc<AtomicBool>,
 }
 
@@ -90,7 +90,12 @@ impl Workers {
         let (failure_sender, failures) = mpsc::channel(1);
         let mut tasks = JoinSet::new();
         for number in 1..=count {
-            tasks.spawn(keep(number, Arc::clone(&shared), stopped.clone(), failure_sender.clone()));
+            tasks.spawn(keep_running(
+                number,
+                Arc::clone(&shared),
+                stopped.clone(),
+                failure_sender.clone(),
+            ));
         }
         Self { tasks, stop, failures, muted }
     }
@@ -116,8 +121,8 @@ impl Workers {
     }
 }
 
-/// Keeps one worker running until it is told to stop, or the worker has failed for good.
-async fn keep(
+/// Keeps one worker running until `stopped` changes, or the worker has failed for good.
+async fn keep_running(
     number: u32,
     shared: Arc<SupervisorState>,
     mut stopped: watch::Receiver<bool>,
@@ -128,7 +133,8 @@ async fn keep(
         let mut is_bad_machine = false;
         let (death, words) = match spawn(&shared.executable, &shared.endpoint, shared.threads) {
             Ok(mut child) => {
-                let words = tokio::spawn(listen(number, child.stderr.take(), Arc::clone(&shared)));
+                let words =
+                    tokio::spawn(forward_stderr(number, child.stderr.take(), Arc::clone(&shared)));
                 tokio::select! {
                     status = child.wait() => {
                         let code = status.as_ref().ok().and_then(ExitStatus::code);
@@ -195,7 +201,7 @@ fn spawn(executable: &Path, endpoint: &Endpoint, threads: u32) -> anyhow::Result
 }
 
 /// Forwards a worker's stderr line by line; returns its last lines.
-async fn listen(
+async fn forward_stderr(
     number: u32,
     stderr: Option<impl AsyncRead + Unpin>,
     shared: Arc<SupervisorState>,
@@ -261,11 +267,11 @@ mod tests {
     #[tokio::test]
     async fn the_last_lines_are_kept() {
         let text: String = (0..100).map(|i| format!("line {i}\n")).collect();
-        let lines = listen(1, Some(text.as_bytes()), shared()).await;
+        let lines = forward_stderr(1, Some(text.as_bytes()), shared()).await;
         assert_eq!(lines.len(), LINES_KEPT_MAX);
         assert_eq!(lines.back().map(String::as_str), Some("line 99"));
         let endless = vec![b'x'; 3 * 4096];
-        let lines = listen(1, Some(endless.as_slice()), shared()).await;
+        let lines = forward_stderr(1, Some(endless.as_slice()), shared()).await;
         assert_eq!(lines.len(), 3);
     }
 

@@ -1,7 +1,7 @@
 use serde_json::json;
 
 use super::*;
-use crate::results_directory::tests::fetched;
+use crate::results_directory::tests::sample_output;
 use crate::sample_result::{drawn_posterior, identification, posterior, propagation};
 use osteon_common::results::Status;
 
@@ -11,7 +11,7 @@ fn output(grouped: bool) -> Fetched {
     if !grouped {
         let partial = json!({ "dispersion": null, "posterior": posterior() });
         let result = identification(&partial.to_string());
-        return Fetched { result, samples: vec![samples], ..fetched(Status::Converged) };
+        return Fetched { result, samples: vec![samples], ..sample_output(Status::Converged) };
     }
     let text = include_str!("../../../fuzz/corpus/results/groups.json");
     let mut result = ResultFile::from_json(text).unwrap();
@@ -20,7 +20,7 @@ fn output(grouped: bool) -> Fetched {
         (group.dispersion, group.posterior) = (None, Some(posterior()));
     }
     let samples = vec![samples; result.groups().len()];
-    Fetched { result, samples, ..fetched(Status::Converged) }
+    Fetched { result, samples, ..sample_output(Status::Converged) }
 }
 
 fn draws(group: Option<u32>, first: u64) -> Part {
@@ -50,7 +50,7 @@ fn parts(output: &Fetched) -> Vec<Part> {
     parts
 }
 
-fn assembled(parts: Vec<Part>) -> Result<Fetched, Malformed> {
+fn assemble_parts(parts: Vec<Part>) -> Result<Fetched, Malformed> {
     let mut fetched = FetchedParts::default();
     parts.into_iter().try_for_each(|part| fetched.add(part))?;
     fetched.assemble()
@@ -60,7 +60,7 @@ fn assembled(parts: Vec<Part>) -> Result<Fetched, Malformed> {
 fn draws_come_back_to_their_posterior() {
     for grouped in [false, true] {
         let output = output(grouped);
-        let again = assembled(parts(&output)).unwrap();
+        let again = assemble_parts(parts(&output)).unwrap();
         assert_eq!(again, output);
     }
 }
@@ -70,7 +70,7 @@ fn draws_out_of_place_are_refused() {
     let refused = |grouped: bool, change: fn(&mut Vec<Part>)| {
         let mut parts = parts(&output(grouped));
         change(&mut parts);
-        match assembled(parts).unwrap_err() {
+        match assemble_parts(parts).unwrap_err() {
             Malformed::OutOfRange { field, .. }
             | Malformed::WrongLength { field, .. }
             | Malformed::Missing { field } => field,
@@ -86,7 +86,7 @@ fn draws_out_of_place_are_refused() {
     // A result without a posterior has no draws.
     let without = |parts: &mut Vec<Part>| {
         if let Part::Result(result) = &mut parts[1] {
-            result.json = fetched(Status::Converged).result.to_json();
+            result.json = sample_output(Status::Converged).result.to_json();
         }
     };
     assert_eq!(refused(false, without), "draws");
@@ -103,7 +103,7 @@ fn a_result_that_is_none_is_refused() {
                 _ => {}
             }
         }
-        assembled(parts).unwrap_err().to_string()
+        assemble_parts(parts).unwrap_err().to_string()
     };
     for grouped in [false, true] {
         assert!(refused(grouped, "").starts_with("field `json`: "), "{}", refused(grouped, ""));

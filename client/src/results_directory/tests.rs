@@ -24,7 +24,7 @@ pub(crate) fn specification() -> JobSpecification {
 }
 
 /// The output of a job that ended so, without a best point.
-pub(crate) fn fetched(status: Status) -> Fetched {
+pub(crate) fn sample_output(status: Status) -> Fetched {
     let failure = (status == Status::Failed).then_some(JobFailure::NoFeasiblePoint);
     let partial = json!({
         "status": status, "failure": failure, "reason": null, "dispersion": null, "posterior": null,
@@ -47,8 +47,8 @@ fn only_a_run_that_ended_by_itself_is_finished_and_needs_no_store() {
         let directory = ResultsDirectory::open(&path).unwrap();
         let request = directory.request().unwrap();
         fs::create_dir(directory.store()).unwrap();
-        let written = fetched(status).result;
-        directory.write_results(&fetched(status), &Silent).unwrap();
+        let written = sample_output(status).result;
+        directory.write_results(&sample_output(status), &Silent).unwrap();
 
         let ended = status != Status::Cancelled;
         let finished = ResultsDirectory::finished(&path, &specification()).unwrap();
@@ -67,8 +67,8 @@ fn a_directory_belongs_to_one_specification() {
     let scratch = tempfile::tempdir().unwrap();
     let directory = ResultsDirectory::open(scratch.path()).unwrap();
     let specification = specification();
-    let written = fetched(Status::Converged).result;
-    directory.write_results(&fetched(Status::Converged), &Silent).unwrap();
+    let written = sample_output(Status::Converged).result;
+    directory.write_results(&sample_output(Status::Converged), &Silent).unwrap();
     let stored = |specification| ResultsDirectory::stored(scratch.path(), specification);
     assert_eq!(stored(&specification).unwrap(), Some(written));
     let mut other = specification.clone();
@@ -81,7 +81,7 @@ fn a_directory_belongs_to_one_specification() {
 fn a_damaged_result_is_refused_with_the_key_and_what_to_do() {
     let scratch = tempfile::tempdir().unwrap();
     let directory = ResultsDirectory::open(scratch.path()).unwrap();
-    directory.write_results(&fetched(Status::Converged), &Silent).unwrap();
+    directory.write_results(&sample_output(Status::Converged), &Silent).unwrap();
     let path = scratch.path().join(RESULT);
     let text = fs::read_to_string(&path).unwrap();
     let refused = |text: String| {
@@ -107,7 +107,7 @@ fn the_draws_have_a_file_if_the_job_asks_for_them() {
     let written = |change: &dyn Fn(&mut Fetched)| {
         let scratch = tempfile::tempdir().unwrap();
         let directory = ResultsDirectory::open(scratch.path()).unwrap();
-        let mut fetched = fetched(Status::Converged);
+        let mut fetched = sample_output(Status::Converged);
         change(&mut fetched);
         directory.write_results(&fetched, &Silent).unwrap();
         let provenance = fs::read_to_string(scratch.path().join("provenance.json")).unwrap();
@@ -136,7 +136,7 @@ fn a_directory_is_held_until_everything_is_written() {
         assert!(failure.to_string().contains("another osteon is running"), "{what}: {failure}");
     };
     refused("opened");
-    directory.write_results(&fetched(Status::Converged), &Silent).unwrap();
+    directory.write_results(&sample_output(Status::Converged), &Silent).unwrap();
     refused("written");
     drop(directory);
     assert!(!scratch.path().join(LOCK).exists());
@@ -161,7 +161,7 @@ fn a_run_that_failed_because_of_its_machines_is_run_again_from_nothing() {
     let path = scratch.path().join("out");
     let directory = ResultsDirectory::open(&path).unwrap();
     let request = directory.request().unwrap();
-    let mut failed = fetched(Status::Failed);
+    let mut failed = sample_output(Status::Failed);
     failed.result = identification(
         r#"{"status": "failed", "failure": "integrity_error", "reason": "realization 3 is …"}"#,
     );

@@ -53,7 +53,7 @@ impl AccessLayer {
         let certificate = peer.map_or(Certificate::Absent, |peer| peer.certificate);
         let header = request.headers().get(http::header::AUTHORIZATION);
         let presented = access::presented(header.map(http::HeaderValue::as_bytes));
-        let need = access::need(path);
+        let need = access::requirement(path);
         let policy = Arc::clone(&self.policy.borrow());
         match access::decide(&policy, certificate, presented, need) {
             Ok(holder) => {
@@ -126,7 +126,7 @@ where
                 Ok(place) => place,
                 Err(status) => return Ok(status.into_http()),
             };
-            let message = message.within(Duration::from_secs(SUBMISSION_SECONDS_MAX));
+            let message = message.collect_within(Duration::from_secs(SUBMISSION_SECONDS_MAX));
             inner.call(http::Request::from_parts(head, Body::new(message))).await
         })
     }

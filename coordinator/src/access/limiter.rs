@@ -67,7 +67,7 @@ impl Limiter {
     /// # Errors
     /// `RESOURCE_EXHAUSTED` when there is no permit within the time limit.
     pub(crate) async fn acquire(&self, caller: Caller) -> Result<Permit, Status> {
-        let own = self.own(caller);
+        let own = self.own_semaphore(caller);
         let both = async {
             // The caller's own permit comes first: whoever waits for it blocks nobody else.
             let own = own.acquire_owned().await.ok()?;
@@ -78,7 +78,7 @@ impl Limiter {
         timeout(PATIENCE, both).await.ok().flatten().ok_or_else(full)
     }
 
-    fn own(&self, caller: Caller) -> Arc<Semaphore> {
+    fn own_semaphore(&self, caller: Caller) -> Arc<Semaphore> {
         // Nothing panics while the lock is held.
         let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
         own.retain(|_, semaphore| semaphore.strong_count() > 0);

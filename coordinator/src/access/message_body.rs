@@ -52,7 +52,7 @@ impl MessageBody {
     }
 
     /// Returns the whole body, which must arrive within `limit` from now.
-    pub(crate) fn within(self, limit: Duration) -> Self {
+    pub(crate) fn collect_within(self, limit: Duration) -> Self {
         Self { patience: Some((limit, Box::pin(sleep(limit)))), ..self }
     }
 }
@@ -110,7 +110,7 @@ mod tests {
         let body = Body::new(Pieces(pieces.into()));
         let message = MessageBody::begin(body).await.unwrap();
         assert_eq!(message.length(), 0x1_0203);
-        let mut message = message.within(Duration::from_secs(3));
+        let mut message = message.collect_within(Duration::from_secs(3));
         let mut passed = Vec::new();
         let error = loop {
             match poll_fn(|cx| Pin::new(&mut message).poll_frame(cx)).await.unwrap() {

@@ -31,7 +31,7 @@ const NEEDS: [(&str, Requirement); 17] = [
 #[test]
 fn every_method_asks_for_something() {
     for (path, expected) in NEEDS {
-        assert_eq!(need(path), expected, "{path}");
+        assert_eq!(requirement(path), expected, "{path}");
     }
     for (path, expected) in [
         // A method that is added later has the strictest requirement until one is chosen for it.
@@ -44,7 +44,7 @@ fn every_method_asks_for_something() {
         ("/", Requirement::Known),
         ("", Requirement::Known),
     ] {
-        assert_eq!(need(path), expected, "{path}");
+        assert_eq!(requirement(path), expected, "{path}");
     }
 }
 
@@ -108,13 +108,13 @@ fn who_may_call_what_is_a_table() {
         ("admin", Presented::Token(admin.reveal())),
     ];
     let none = [Err(Unknown), Err(Unknown), Err(Unknown)];
-    let of = |rest: [Result<(), Code>; 3]| [none, rest].concat();
+    let answers = |rest: [Result<(), Code>; 3]| [none, rest].concat();
     let table = [
         (Requirement::Nothing, vec![Ok(()); 6]),
-        (Requirement::Known, of([Ok(()); 3])),
-        (Requirement::Role(Role::Read), of([Ok(()); 3])),
-        (Requirement::Role(Role::Submit), of([Err(Weak), Ok(()), Ok(())])),
-        (Requirement::Role(Role::Admin), of([Err(Weak), Err(Weak), Ok(())])),
+        (Requirement::Known, answers([Ok(()); 3])),
+        (Requirement::Role(Role::Read), answers([Ok(()); 3])),
+        (Requirement::Role(Role::Submit), answers([Err(Weak), Ok(()), Ok(())])),
+        (Requirement::Role(Role::Admin), answers([Err(Weak), Err(Weak), Ok(())])),
     ];
     for policy in [Policy::Tokens(list.clone()), Policy::Tls(list.clone())] {
         for (need, expected) in &table {
@@ -213,6 +213,6 @@ fn the_page_is_for_everybody_and_its_data_need_the_role_of_the_api() {
         ("/data/new", Requirement::Known),
         ("//", Requirement::Known),
     ] {
-        assert_eq!(page_need(path), requirement, "{path}");
+        assert_eq!(page_requirement(path), requirement, "{path}");
     }
 }

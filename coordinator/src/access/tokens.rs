@@ -168,10 +168,10 @@ impl Tokens {
             if words.trim().is_empty() {
                 continue;
             }
-            let wrong = |fault| TokensError::Line { path: path.to_owned(), line, fault };
-            let entry = entry(words).map_err(wrong)?;
+            let line_error = |fault| TokensError::Line { path: path.to_owned(), line, fault };
+            let entry = entry(words).map_err(line_error)?;
             if let Some(first) = lines.insert(entry.hash.to_string(), line) {
-                return Err(wrong(LineFault::Twice { name: entry.holder.name, first }));
+                return Err(line_error(LineFault::Twice { name: entry.holder.name, first }));
             }
             if entries.len() == TOKENS_MAX {
                 return Err(TokensError::TooMany { path: path.to_owned(), max: TOKENS_MAX });
@@ -204,9 +204,9 @@ impl Role {
 /// Returns whether a token can have this name. Names are shown, so one that may be a token, or most
 /// of one, is not allowed.
 pub fn is_name(name: &str) -> bool {
-    let allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._-@".contains(&byte);
+    let is_allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._-@".contains(&byte);
     (1..=NAME_BYTES_MAX).contains(&name.len())
-        && name.bytes().all(allowed)
+        && name.bytes().all(is_allowed)
         && !name.contains(PREFIX)
         && !name.split(|c: char| !c.is_ascii_hexdigit()).any(|run| run.len() >= SECRET_DIGITS)
 }

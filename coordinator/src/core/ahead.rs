@@ -60,7 +60,6 @@ impl Ahead {
         self.branches.iter().filter_map(|followed| followed.evaluation.as_ref())
     }
 
-    /// As [`Ahead::evaluations`].
     pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
         self.branches.iter_mut().filter_map(|followed| followed.evaluation.as_mut())
     }
@@ -77,23 +76,24 @@ impl Ahead {
 
     /// Returns whether a point is evaluated, or has been.
     pub(crate) fn has(&self, point: &Point) -> bool {
-        self.prepared(point).is_some() || self.evaluations().any(|it| same_point(&it.point, point))
+        self.prepared_evaluation(point).is_some()
+            || self.evaluations().any(|it| same_point(&it.point, point))
     }
 
     /// Returns the complete evaluation of a point.
-    pub(crate) fn prepared(&self, point: &Point) -> Option<&PreparedEvaluation> {
+    pub(crate) fn prepared_evaluation(&self, point: &Point) -> Option<&PreparedEvaluation> {
         self.prepared.get(&point_bits(point))
     }
 
     /// Takes the complete evaluations that have waited since `before` and are not in the store.
     pub(crate) fn take_unsaved(&mut self, before: Duration) -> Vec<PendingEvaluation> {
-        let old = |(_, complete): &mut (Box<PendingEvaluation>, Duration)| *complete <= before;
+        let is_old = |(_, complete): &mut (Box<PendingEvaluation>, Duration)| *complete <= before;
         let prepared = self.prepared.values_mut();
-        prepared.filter_map(|prepared| prepared.unsaved.take_if(old)).map(|it| *it.0).collect()
+        prepared.filter_map(|prepared| prepared.unsaved.take_if(is_old)).map(|it| *it.0).collect()
     }
 
     /// Returns the complete evaluations.
-    pub(crate) fn all_prepared(&self) -> impl Iterator<Item = &PreparedEvaluation> {
+    pub(crate) fn prepared_evaluations(&self) -> impl Iterator<Item = &PreparedEvaluation> {
         self.prepared.values()
     }
 
@@ -104,7 +104,7 @@ impl Ahead {
 
     /// Passes the evaluation of a part's branch to the branch, and keeps it for the search, if it is
     /// complete; returns whether it is.
-    pub(crate) fn take_in(&mut self, part: u64, now: Duration) -> bool {
+    pub(crate) fn pass_to_branch(&mut self, part: u64, now: Duration) -> bool {
         let followed = self.branches.iter_mut().find(|followed| followed.part == part);
         let Some(FollowedBranch { branch, evaluation, .. }) = followed else {
             return false;

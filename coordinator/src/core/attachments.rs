@@ -1,5 +1,5 @@
-//! Bound on the attachments of each host: workers that come and go all the time cost the coordinator time, and
-//! the jobs their batches.
+//! Bound on the attachments of each host: workers that come and go all the time take time of the coordinator, and
+//! jobs lose the batches that they held.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use osteon_common::limits::WORKERS_MAX;
 
 use crate::core::policy::{ATTACHMENT_BURST, ATTACHMENTS_PER_SECOND};
 
-/// What the hosts that attached in the last minute are still allowed, by host.
+/// How many more times each host that attached in the last minute may attach.
 #[derive(Debug, Default)]
 pub(crate) struct Attachments(BTreeMap<String, Allowance>);
 

@@ -41,7 +41,7 @@ pub(crate) fn is_chosen(
     uniform(key, [job.0, number, first]) < fraction
 }
 
-/// When answers of a worker are audited next, and how many realizations of them.
+/// When answers of a worker are audited next, and how many of their realizations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NextAudit {
     /// Number of realizations that it computes until then.
@@ -59,15 +59,16 @@ impl NextAudit {
 }
 
 /// Returns which of the realizations `answered` by a worker are audited, `None` if none are due, and the audit
-/// after this one. So that a machine that breaks is found soon, few realizations are audited often, `least` at a
-/// time. When they are due is drawn, so that no worker can foresee it: twice the mean at the latest.
+/// after this one. Few realizations, but at least `least`, are audited at a time and often, so that a machine that
+/// breaks is found soon. When the next audit is due is drawn, so that no worker can foresee it; the interval is at
+/// most twice the mean.
 pub(crate) fn choose(
     (key, fraction): (&AuditKey, f64),
     (batch, least): (BatchId, u64),
     answered: Indices,
     due: NextAudit,
 ) -> (Option<Indices>, NextAudit) {
-    let drawn = |what| uniform(key, [batch.0, answered.first, what]);
+    let draw = |what| uniform(key, [batch.0, answered.first, what]);
     let left = due.left - answered.count as f64;
     if left > 0.0 {
         return (None, NextAudit { left, ..due });
@@ -75,20 +76,20 @@ pub(crate) fn choose(
     let share = (fraction * answered.count as f64).ceil() as u64;
     let length = share.max(due.length).clamp(1, answered.count);
     let room = answered.count - length + 1;
-    let offset = ((drawn(0) * room as f64) as u64).min(room - 1);
+    let offset = ((draw(0) * room as f64) as u64).min(room - 1);
     let audited = Indices { first: answered.first + offset, count: length };
     if fraction >= 1.0 {
         return (Some(audited), NextAudit { left: 0.0, length });
     }
-    // What this answer had too much, and what was audited more than was planned, counts for the next, so that
-    // the fraction is kept.
+    // The realizations of this answer after the audit was due, and those that were audited beyond the plan, change
+    // when the next audit is due, so that the fraction is kept.
     let unplanned = (length as f64 - due.length as f64) / fraction;
     let next = share.max(least).min(answered.count);
-    let left = left + unplanned + distance(fraction, next, drawn(1));
+    let left = left + unplanned + distance(fraction, next, draw(1));
     (Some(audited), NextAudit { left, length: next })
 }
 
-/// Returns the number of realizations for which this many audited ones are the fraction, times 2 u.
+/// Returns the number of realizations of which `audited` are the fraction, times 2 u.
 fn distance(fraction: f64, audited: u64, u: f64) -> f64 {
     if fraction >= 1.0 { 0.0 } else { 2.0 * u * audited as f64 / fraction }
 }
@@ -120,20 +121,20 @@ mod tests {
         for (fraction, least, most) in
             [(0.0, 0, 0), (0.01, 70, 130), (0.5, 4800, 5200), (1.0, 10_000, 10_000)]
         {
-            let chosen = chosen(&AuditKey([7; 32]), fraction).len();
+            let chosen = chosen_batches(&AuditKey([7; 32]), fraction).len();
             assert!((least..=most).contains(&chosen), "{chosen} at {fraction}");
         }
     }
 
     /// Returns which of many batches are chosen.
-    fn chosen(key: &AuditKey, fraction: f64) -> Vec<u64> {
-        let of = |i: &u64| is_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
-        (0..10_000).filter(of).collect()
+    fn chosen_batches(key: &AuditKey, fraction: f64) -> Vec<u64> {
+        let is_audited = |i: &u64| is_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
+        (0..10_000).filter(is_audited).collect()
     }
 
     /// Returns the fraction of the realizations that is audited, and the most that a worker computes between
     /// two audits, over many batches of this size.
-    fn audited(fraction: f64, slots: u32, count: u64) -> (f64, u64) {
+    fn audited_share(fraction: f64, slots: u32, count: u64) -> (f64, u64) {
         let mut due = NextAudit::first((&AuditKey([7; 32]), fraction), LeaseId(1), slots);
         let (mut audited, mut since, mut longest) = (0, 0, 0);
         let batches = 400_000 / count;
@@ -164,21 +165,21 @@ mod tests {
             (0.3, 2, 40),
             (0.01, 4, 50),
         ] {
-            let (found, longest) = audited(fraction, slots, count);
+            let (found, longest) = audited_share(fraction, slots, count);
             assert!((0.9..1.15).contains(&(found / fraction)), "{found} of {fraction}");
             let most = 2.0 * f64::from(slots).max(fraction * count as f64 + 1.0) / fraction;
             assert!(longest as f64 <= most + count as f64, "{longest}, {most} with {count}");
         }
-        assert_eq!(audited(0.0, 1, 100).0, 0.0);
-        assert_eq!(audited(1.0, 8, 3).0, 1.0);
-        assert_eq!(audited(1.0, 1, 100).0, 1.0);
+        assert_eq!(audited_share(0.0, 1, 100).0, 0.0);
+        assert_eq!(audited_share(1.0, 8, 3).0, 1.0);
+        assert_eq!(audited_share(1.0, 1, 100).0, 1.0);
     }
 
     #[test]
     fn who_does_not_know_the_key_does_not_know_the_choice() {
         let keys = [AuditKey::default(), AuditKey::random().unwrap(), AuditKey::random().unwrap()];
         assert_ne!(keys[1], keys[2]);
-        let [known, one, other] = keys.map(|key| chosen(&key, 0.5));
+        let [known, one, other] = keys.map(|key| chosen_batches(&key, 0.5));
         for (one, other) in [(&known, &one), (&known, &other), (&one, &other)] {
             let both = one.iter().filter(|i| other.contains(i)).count();
             // A quarter of 10,000, with a standard deviation of 43.

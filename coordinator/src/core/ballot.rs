@@ -65,7 +65,6 @@ impl Ballot {
         Self { indices, answers: Vec::new(), votes: BTreeMap::new() }
     }
 
-    /// The realizations.
     pub(crate) fn indices(&self) -> Indices {
         self.indices
     }
@@ -86,7 +85,7 @@ impl Ballot {
     }
 
     /// Returns the same votes about one of the realizations.
-    pub(crate) fn about(&self, index: u64) -> Self {
+    pub(crate) fn for_index(&self, index: u64) -> Self {
         let mut about = Self::new(Indices { first: index, count: 1 });
         let at = usize::try_from(index.saturating_sub(self.indices.first)).unwrap_or(usize::MAX);
         for (by, place) in self.votes.values() {
@@ -131,7 +130,7 @@ impl Ballot {
 
     /// Returns the number of votes that the leading answer lacks for a majority of `voters` hosts.
     pub(crate) fn lacks(&self, voters: usize) -> usize {
-        let leading = self.leading().map_or(0, |place| self.answers[place].1);
+        let leading = self.leading_answer().map_or(0, |place| self.answers[place].1);
         (voters.max(self.votes.len()) / 2 + 1).saturating_sub(leading)
     }
 
@@ -143,7 +142,7 @@ impl Ballot {
 
     /// Returns what `voters` hosts have decided: `None` as long as no answer has a majority.
     pub(crate) fn verdict(&self, voters: usize) -> Option<BallotResult> {
-        let right = self.leading().filter(|_| self.lacks(voters) == 0)?;
+        let right = self.leading_answer().filter(|_| self.lacks(voters) == 0)?;
         let votes = || self.votes.values();
         let agreeing = votes().filter(|(_, place)| *place == right).map(|(by, _)| by);
         let agreeing: Vec<&WorkerName> = agreeing.collect();
@@ -173,7 +172,7 @@ impl Ballot {
     }
 
     /// Returns the place of the answer that most hosts gave.
-    fn leading(&self) -> Option<usize> {
+    fn leading_answer(&self) -> Option<usize> {
         let counted = self.answers.iter().enumerate().rev();
         counted.max_by_key(|(_, (_, count))| *count).map(|(place, _)| place)
     }

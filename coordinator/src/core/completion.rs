@@ -29,7 +29,7 @@ pub struct Gathered {
     /// Number of the attempt at it.
     pub(crate) attempt: u64,
     pub(crate) record: EvaluationRecord,
-    /// The evaluations stored after it belong to another path.
+    /// Whether the evaluations stored after it belong to another path.
     pub(crate) is_last: bool,
 }
 
@@ -39,7 +39,6 @@ pub struct Completed {
     pub(crate) job: JobId,
     /// Number of the attempt at it.
     pub(crate) attempt: u64,
-    /// The search after it.
     pub(crate) after: Box<Search>,
 }
 

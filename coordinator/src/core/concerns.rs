@@ -39,9 +39,9 @@ impl Bounded {
     }
 
     /// Returns how much is used, and the bound.
-    pub(crate) fn used(self, state: &State) -> (u64, u64) {
+    pub(crate) fn usage(self, state: &State) -> (u64, u64) {
         match self {
-            Self::Jobs => (state.unfinished() as u64, JOBS_MAX as u64),
+            Self::Jobs => (state.unfinished_jobs() as u64, JOBS_MAX as u64),
             Self::JobBytes => {
                 (state.jobs.values().map(|job| job.bytes).sum(), state.config.jobs_bytes_max)
             }
@@ -75,7 +75,7 @@ pub(crate) fn concerns(state: &State, now: Duration) -> Vec<Concern> {
         }
     }
     for what in Bounded::ALL {
-        let (used, most) = what.used(state);
+        let (used, most) = what.usage(state);
         if used > 0 && used >= most / 2 {
             found.push(Concern::NearBound { what, used, most });
         }
@@ -83,14 +83,14 @@ pub(crate) fn concerns(state: &State, now: Duration) -> Vec<Concern> {
     found
 }
 
-/// Returns the concerns that the log was not told of yet.
+/// Returns the concerns that the coordinator's log does not say yet.
 pub(crate) fn new_ones(state: &mut State, now: Duration) -> Vec<Concern> {
     let mut all = concerns(state, now);
     let kinds: Vec<ConcernKind> = all.iter().map(Concern::kind).collect();
     // A number that goes up and down around the half is told once.
     let stays = |kind: &ConcernKind| match kind {
         ConcernKind::NearBound(what) => {
-            let (used, most) = what.used(state);
+            let (used, most) = what.usage(state);
             used >= most / 8 * 3
         }
         _ => kinds.contains(kind),

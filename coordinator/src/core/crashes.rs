@@ -28,9 +28,7 @@ pub(crate) enum Cause {
 /// A worker whose stay has ended.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LostWorker {
-    /// The worker.
     pub(crate) worker: WorkerName,
-    /// The reason.
     pub(crate) cause: Cause,
     /// Time when its stay ended.
     pub(crate) at: Duration,

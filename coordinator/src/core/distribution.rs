@@ -18,7 +18,6 @@ pub(crate) struct TimeDistribution {
 }
 
 impl TimeDistribution {
-    /// Counts a time.
     pub(crate) fn add(&mut self, time: Duration) {
         let bucket = BOUNDS_S.partition_point(|bound| *bound < time.as_secs_f64());
         if let Some(count) = self.counts.get_mut(bucket) {

@@ -8,7 +8,8 @@ use crate::store::DoubtRecord;
 /// The doubts about a job.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Doubts {
-    /// Numbers of the bans, with the digest of the result before it was computed again, if it was.
+    /// Numbers of the bans, each with the digest of the result before the job was computed again; `None`
+    /// if it was not.
     bans: Vec<(u64, Option<String>)>,
     /// Digest of the result.
     digest: Option<String>,
@@ -36,7 +37,7 @@ impl Doubts {
         self.digest = Some(digest);
     }
 
-    /// Notes that the job is computed again: the digest of its result is that before.
+    /// Notes that the job is computed again: open doubts keep the digest of its present result.
     pub(crate) fn reopen(&mut self) {
         let before = self.digest.take().unwrap_or_default();
         for (_, digest) in self.bans.iter_mut().filter(|(_, digest)| digest.is_none()) {
@@ -44,13 +45,13 @@ impl Doubts {
         }
     }
 
-    /// Describes it in a sentence; empty if there is no doubt. `host_of` returns the host of a ban.
+    /// Describes the doubts in a sentence; empty if there are none. `host_of` returns the host of a ban.
     pub(crate) fn statement(&self, host_of: impl Fn(u64) -> Option<String>) -> String {
         let digest = self.digest.as_deref().unwrap_or_default();
         self.integrity(host_of).map_or_else(String::new, |it| it.statement(digest))
     }
 
-    /// Returns what a result says about it.
+    /// Returns what a result says about the doubts; `None` if there are none.
     pub(crate) fn integrity(&self, host_of: impl Fn(u64) -> Option<String>) -> Option<Integrity> {
         let (open, settled): (Vec<_>, Vec<_>) =
             self.bans.iter().partition(|(_, before)| before.is_none());

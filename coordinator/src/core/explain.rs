@@ -29,10 +29,10 @@ pub(crate) fn explanation(facts: &JobFacts) -> ExplainResponse {
         slots: facts.slots,
         slots_used: facts.slots_used,
         realizations: facts.realizations,
-        realizations_left: if computes { facts.left() } else { 0 },
+        realizations_left: if computes { facts.lacking_realizations() } else { 0 },
         realizations_per_second: facts.rate,
-        expected_s: expected(reason, facts).map(|time| time.as_secs_f64()),
-        waiting_s: waiting(reason, facts).map(|time| time.as_secs_f64()),
+        expected_s: expected_time(reason, facts).map(|time| time.as_secs_f64()),
+        waiting_s: waiting_time(reason, facts).map(|time| time.as_secs_f64()),
         worker: facts.oldest.as_ref().filter(|_| waits_for_worker).map(|oldest| oldest.worker.0),
     }
 }
@@ -69,19 +69,19 @@ fn reason(facts: &JobFacts) -> PaceReason {
 }
 
 /// Returns the expected time of the evaluation under way.
-fn expected(reason: PaceReason, facts: &JobFacts) -> Option<Duration> {
+fn expected_time(reason: PaceReason, facts: &JobFacts) -> Option<Duration> {
     let runs = matches!(facts.standing, Standing::Computing)
         && matches!(
             reason,
             PaceReason::OtherJobs | PaceReason::FewRealizations | PaceReason::Computing
         );
     // A rate may be tiny; what does not fit into a duration is not foreseeable.
-    let seconds = facts.left() as f64 / facts.rate;
+    let seconds = facts.lacking_realizations() as f64 / facts.rate;
     (runs && facts.rate > 0.0).then(|| Duration::try_from_secs_f64(seconds).ok()).flatten()
 }
 
 /// Returns for how long a job has been waiting for what delays it.
-fn waiting(reason: PaceReason, facts: &JobFacts) -> Option<Duration> {
+fn waiting_time(reason: PaceReason, facts: &JobFacts) -> Option<Duration> {
     match reason {
         PaceReason::StoreRefuses => facts.refusal.as_ref().map(|(_, since)| *since),
         PaceReason::WaitingForTurn | PaceReason::StoreSlow => Some(facts.unanswered),
@@ -93,8 +93,8 @@ fn waiting(reason: PaceReason, facts: &JobFacts) -> Option<Duration> {
 }
 
 fn text(reason: PaceReason, facts: &JobFacts) -> String {
-    let since =
-        waiting(reason, facts).map_or_else(String::new, |time| format!("{} s", time.as_secs()));
+    let since = waiting_time(reason, facts)
+        .map_or_else(String::new, |time| format!("{} s", time.as_secs()));
     match reason {
         PaceReason::Unspecified => String::new(),
         PaceReason::Ended => match &facts.standing {
@@ -139,12 +139,15 @@ fn text(reason: PaceReason, facts: &JobFacts) -> String {
             realizations(facts.quarantined)
         ),
         PaceReason::WorkersUnavailable => unavailable(facts),
-        PaceReason::LastRealizations => {
-            facts.oldest.as_ref().map_or_else(String::new, |oldest| last(facts, oldest))
-        }
+        PaceReason::LastRealizations => facts
+            .oldest
+            .as_ref()
+            .map_or_else(String::new, |oldest| explain_last_batches(facts, oldest)),
         PaceReason::OtherJobs => others(facts),
-        PaceReason::FewRealizations => few(facts),
-        PaceReason::Computing => format!("{} More workers make it faster.", speed(reason, facts)),
+        PaceReason::FewRealizations => explain_few_realizations(facts),
+        PaceReason::Computing => {
+            format!("{} More workers make it faster.", describe_speed(reason, facts))
+        }
     }
 }
 
@@ -165,7 +168,7 @@ fn unavailable(facts: &JobFacts) -> String {
     )
 }
 
-fn last(facts: &JobFacts, oldest: &OldestBatch) -> String {
+fn explain_last_batches(facts: &JobFacts, oldest: &OldestBatch) -> String {
     let instead = match oldest.duplicates {
         0 if oldest.overdue => " No other worker is free to compute the same.",
         0 => "",
@@ -175,7 +178,7 @@ fn last(facts: &JobFacts, oldest: &OldestBatch) -> String {
     format!(
         "The evaluation lacks {} of {} realizations, and all are out: {} has been computing {} of them for \
          {} s.{instead}",
-        facts.left(),
+        facts.lacking_realizations(),
         facts.realizations,
         oldest.name,
         oldest.count,
@@ -199,13 +202,13 @@ fn others(facts: &JobFacts) -> String {
     };
     format!(
         "{} Other jobs use {:.0} slots. {why}",
-        speed(PaceReason::OtherJobs, facts),
+        describe_speed(PaceReason::OtherJobs, facts),
         facts.slots_of_others
     )
 }
 
-fn few(facts: &JobFacts) -> String {
-    let speed = speed(PaceReason::FewRealizations, facts);
+fn explain_few_realizations(facts: &JobFacts) -> String {
+    let speed = describe_speed(PaceReason::FewRealizations, facts);
     if facts.is_search {
         format!(
             "{speed} A search evaluates one point after another, with {} each, fewer than slots: more workers \
@@ -221,8 +224,8 @@ fn few(facts: &JobFacts) -> String {
 }
 
 /// Describes at which speed a job runs.
-fn speed(reason: PaceReason, facts: &JobFacts) -> String {
-    let left = expected(reason, facts).map_or_else(String::new, |time| {
+fn describe_speed(reason: PaceReason, facts: &JobFacts) -> String {
+    let left = expected_time(reason, facts).map_or_else(String::new, |time| {
         let needs = match time.as_secs_f64() {
             ..0.1 => "less than 0.1".to_owned(),
             seconds => format!("about {seconds:.1}"),

@@ -18,8 +18,8 @@ pub enum RunFailure {
          wrongly, and the answers of {} give no majority. Run `osteon doctor` on each of them, and submit the \
          job again without the wrong one, or with workers on more hosts: at least three, most of them sound",
         contradiction.index, point,
-        shown(contradiction.answers[0].1), contradiction.answers[0].0,
-        shown(contradiction.answers[1].1), contradiction.answers[1].0,
+        describe_answer(contradiction.answers[0].1), contradiction.answers[0].0,
+        describe_answer(contradiction.answers[1].1), contradiction.answers[1].0,
         hosts(&contradiction.hosts)
     )]
     Contradiction {
@@ -81,7 +81,7 @@ fn shown_observables(observables: &ObservedValues) -> String {
 }
 
 /// Describes an answer, for people.
-pub(crate) fn shown(solved: RealizationResult) -> String {
+pub(crate) fn describe_answer(solved: RealizationResult) -> String {
     match solved.outcome {
         Ok(velocity) => format!(
             "{velocity} m/s (bits {:016x}, estimated error {:?}{})",

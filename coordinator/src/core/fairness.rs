@@ -47,7 +47,7 @@ impl Shares {
     }
 
     /// Returns the computing time that `client` has received.
-    pub(crate) fn used(&self, client: &str) -> Duration {
+    pub(crate) fn computing_time(&self, client: &str) -> Duration {
         self.0.get(client).map_or(Duration::ZERO, |share| share.used)
     }
 
@@ -83,16 +83,16 @@ mod tests {
         shares.begin("a");
         shares.charge("a", s(100));
         shares.begin("b");
-        assert_eq!(shares.used("b"), s(100));
+        assert_eq!(shares.computing_time("b"), s(100));
         shares.charge("b", s(10));
         shares.correct("b", s(10), s(4));
-        assert_eq!(shares.used("b"), s(104));
+        assert_eq!(shares.computing_time("b"), s(104));
         shares.begin("b");
         shares.end("b");
-        assert_eq!((shares.jobs("b"), shares.used("b")), (1, s(104)));
+        assert_eq!((shares.jobs("b"), shares.computing_time("b")), (1, s(104)));
         shares.end("b");
         shares.begin("b");
-        assert_eq!(shares.used("b"), s(100));
+        assert_eq!(shares.computing_time("b"), s(100));
     }
 
     #[test]

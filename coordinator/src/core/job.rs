@@ -137,16 +137,17 @@ impl Job {
 
     /// Returns all evaluations under way; the one that the search asked for comes first.
     pub(crate) fn evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
-        self.certain().chain(&self.speculation.evaluations)
+        self.certain_evaluations().chain(&self.speculation.evaluations)
     }
 
     /// Returns the evaluation that the search asked for, and those that it will ask for.
-    pub(crate) fn certain(&self) -> impl Iterator<Item = &PendingEvaluation> {
+    pub(crate) fn certain_evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
         self.evaluation().into_iter().chain(self.ahead.evaluations())
     }
 
-    /// As [`Job::certain`].
-    pub(crate) fn certain_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
+    pub(crate) fn certain_evaluations_mut(
+        &mut self,
+    ) -> impl Iterator<Item = &mut PendingEvaluation> {
         let asked_for = match &mut self.stage {
             Stage::Computing(evaluation) => Some(evaluation),
             _ => None,
@@ -154,17 +155,18 @@ impl Job {
         asked_for.into_iter().chain(self.ahead.evaluations_mut())
     }
 
-    /// Returns the one of [`Job::certain`] with this attempt.
-    pub(crate) fn certain_with(&self, attempt: u64) -> Option<&PendingEvaluation> {
-        self.certain().find(|evaluation| evaluation.attempt == attempt)
+    /// Returns the one of [`Job::certain_evaluations`] with this attempt.
+    pub(crate) fn certain_evaluation(&self, attempt: u64) -> Option<&PendingEvaluation> {
+        self.certain_evaluations().find(|evaluation| evaluation.attempt == attempt)
     }
 
-    /// As [`Job::certain_with`].
-    pub(crate) fn certain_with_mut(&mut self, attempt: u64) -> Option<&mut PendingEvaluation> {
-        self.certain_mut().find(|evaluation| evaluation.attempt == attempt)
+    pub(crate) fn certain_evaluation_mut(
+        &mut self,
+        attempt: u64,
+    ) -> Option<&mut PendingEvaluation> {
+        self.certain_evaluations_mut().find(|evaluation| evaluation.attempt == attempt)
     }
 
-    /// As [`Job::evaluations`].
     pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
         let asked_for = match &mut self.stage {
             Stage::Computing(evaluation) => Some(evaluation),
@@ -214,13 +216,12 @@ pub(crate) enum Stage {
     Completing(Settled),
     /// A complete evaluation is being stored.
     StoringEvaluation {
-        /// The evaluation.
         record: EvaluationRecord,
         /// Evaluations stored after it belong to another path of the search and are deleted.
         is_last: bool,
     },
-    /// Evaluations that the search need only be exchanged for are being stored: they were complete
-    /// before it asked for them, or are completed beside the core.
+    /// Evaluations are being stored that were complete before the search asked for them, or are completed
+    /// beside the core. Once they are durable, the search is replaced by the one that has taken them in.
     StoringPrepared {
         /// The evaluations, with consecutive numbers; not empty.
         records: Vec<EvaluationRecord>,
@@ -269,7 +270,7 @@ pub(crate) struct Settled {
     pub(crate) point: Point,
     /// All workers whose answers are among the results.
     pub(crate) workers: Vec<WorkerName>,
-    /// Contents of the store for it.
+    /// What the store has of it.
     pub(crate) stored: StoredRecord,
 }
 
@@ -284,16 +285,16 @@ pub(crate) struct Speculation {
 
 /// Returns the approximate memory of a specification, bytes.
 pub(crate) fn bytes(specification: &JobSpecification) -> u64 {
-    let of_data = |data: &Data| {
+    let data_bytes = |data: &Data| {
         let names: usize =
             data.groups().iter().map(|group| size_of::<Group>() + group.name.len()).sum();
-        let of_set = |set: VelocitySet<'_>| {
+        let set_bytes = |set: VelocitySet<'_>| {
             size_of_val(set.velocities) + set.subjects.map_or(0, size_of_val)
         };
-        let sets: usize = (0..data.sets()).filter_map(|set| data.set(set)).map(of_set).sum();
+        let sets: usize = (0..data.sets()).filter_map(|set| data.set(set)).map(set_bytes).sum();
         names + sets
     };
-    let data = specification.data.as_ref().map_or(0, of_data);
+    let data = specification.data.as_ref().map_or(0, data_bytes);
     (size_of::<JobSpecification>() + data) as u64
 }
 
@@ -372,7 +373,6 @@ impl RequestName {
     }
 }
 
-/// Digest of a specification.
 pub(crate) type SpecificationDigest = [u8; 32];
 
 /// Returns the digest of a specification; different specifications have different digests.

@@ -81,7 +81,6 @@ pub(crate) fn search_rows(state: &State, id: JobId, from: u64, limit: usize) -> 
     }
 }
 
-/// Returns the end of an ended job.
 pub(crate) fn end(state: &State, id: JobId) -> Answer {
     if let Some(ended) = state.ended.get(&id) {
         let integrity = ended.doubts.integrity(|ban| state.host_of_ban(ban));

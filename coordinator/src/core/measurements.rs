@@ -35,9 +35,9 @@ pub(crate) struct StateMeasurements {
     pub(crate) batches_in_flight: u64,
     /// Time since the oldest batch that a worker holds was sent.
     pub(crate) oldest_batch: Duration,
-    /// Time since which the store has refused a record.
+    /// Time for which the store has refused a record.
     pub(crate) store_refusing: Duration,
-    /// Time since which the store's log could not be copied into the database, and its length, bytes.
+    /// Time for which the store's log could not be copied into the database.
     pub(crate) log_stuck: Duration,
     pub(crate) log_stuck_bytes: u64,
     /// Used part of each bound, 0 to 1.
@@ -45,7 +45,6 @@ pub(crate) struct StateMeasurements {
 }
 
 impl StateMeasurements {
-    /// Measures a state.
     pub(crate) fn new(state: &State, now: Duration) -> Self {
         let since =
             |then: Option<Duration>| then.map_or(Duration::ZERO, |it| now.saturating_sub(it));
@@ -55,10 +54,10 @@ impl StateMeasurements {
                 as u64,
             batches_in_flight: state.batches.len() as u64,
             oldest_batch: since(state.batches.values().map(|batch| batch.sent).min()),
-            store_refusing: since(refused_since(state)),
+            store_refusing: since(oldest_refusal(state)),
             log_stuck: since(state.condition.stuck_log.map(|stuck| stuck.since)),
             log_stuck_bytes: state.condition.stuck_log.map_or(0, |stuck| stuck.bytes),
-            bounds_used: Bounded::ALL.map(|what| (what, used_part(what, state))).to_vec(),
+            bounds_used: Bounded::ALL.map(|what| (what, used_fraction(what, state))).to_vec(),
             ..Self::default()
         };
         for job in state.jobs.values() {
@@ -77,7 +76,7 @@ impl StateMeasurements {
             Stage::Waiting => self.jobs_waiting += 1,
             _ => self.jobs_running += 1,
         }
-        for evaluation in job.certain() {
+        for evaluation in job.certain_evaluations() {
             self.realizations_waiting += evaluation.queued() + evaluation.quarantine.len() as u64;
         }
         self.slots_wanted += slots_wanted(job);
@@ -101,9 +100,8 @@ impl StateMeasurements {
     }
 }
 
-/// Returns the used part of a bound.
-fn used_part(what: Bounded, state: &State) -> f64 {
-    let (used, most) = what.used(state);
+fn used_fraction(what: Bounded, state: &State) -> f64 {
+    let (used, most) = what.usage(state);
     used as f64 / most.max(1) as f64
 }
 
@@ -123,15 +121,14 @@ fn slots_wanted(job: &Job) -> u64 {
         (Stage::Computing(evaluation), JobKind::Propagation) => all - evaluation.filled().min(all),
         _ => all.saturating_mul(job.search.parts().saturating_sub(job.search.part())),
     };
-    let each = job.pace.expected(1, 1).map_or(REALIZATION_USUAL_S, |time| time.as_secs_f64());
+    let each = job.pace.expected_time(1, 1).map_or(REALIZATION_USUAL_S, |time| time.as_secs_f64());
     let worth = (realizations as f64 * each / BATCH_WORTH_S).ceil();
     // `as` saturates.
     (worth as u64).clamp(realizations.min(1), realizations)
 }
 
-/// Returns the time since which a record has been refused by the store; the oldest, if there are
-/// several.
-fn refused_since(state: &State) -> Option<Duration> {
+/// Returns since when the store has refused a record; of several, the one refused for longest.
+fn oldest_refusal(state: &State) -> Option<Duration> {
     let jobs = state.jobs.values().filter_map(|job| Some(job.store_retry.as_ref()?.since));
     let bans = state.banned.iter().filter(|banned| banned.refused).map(|banned| banned.record.at);
     jobs.chain(bans).min()

@@ -23,13 +23,13 @@ pub(crate) const BATCH_COST_S: f64 = 1e-4;
 pub(crate) const BATCH_WORTH_S: f64 = 0.02;
 /// Workers that must have computed something of a job before it is known how fast one of the others may be.
 pub(crate) const RATED_WORKERS_MIN: u64 = 8;
-/// Batches of a job that are sent at most within [`UNKNOWN_TIME`] although nobody knows how long they take. The
-/// other workers get theirs after later events. By then some may have answered, and it is known how large a batch
+/// Largest number of batches of a job that are sent within [`UNKNOWN_TIME`] although nobody knows how long they take.
+/// The other workers get theirs after later events. By then some may have answered, and it is known how large a batch
 /// should be.
 pub(crate) const UNKNOWN_AT_ONCE: usize = 256;
-/// Time in which so many batches of unknown duration may be sent. Short ones are answered within it.
+/// Time within which at most [`UNKNOWN_AT_ONCE`] batches of unknown duration are sent. Short ones are answered by then.
 pub(crate) const UNKNOWN_TIME: Duration = Duration::from_millis(25);
-/// Batches for which a measured rate of the fleet is used at least.
+/// Smallest number of batches for which a measured rate of the fleet is used.
 pub(crate) const FLEET_RATE_USES_MIN: u64 = 32;
 /// With this many workers or more, one whose speed at a job is unknown holds one batch of it only: a second one, as
 /// small as the first, would cost more than the moment for which the worker is idle after its answer.
@@ -105,8 +105,8 @@ pub(crate) const ATTACHMENTS_PER_SECOND: f64 = 8.0;
 pub(crate) const VOTERS_MAX: usize = 9;
 /// Realizations of a proof at most. Many of them show a defect that is seldom seen.
 pub(crate) const PROOF_MAX: u64 = 16;
-/// Realizations of an evaluation for each one of a proof beyond the first, so that short jobs can pay for the proofs of
-/// several hosts: nine hosts and 2,747 realizations spend 3.3 % on them, once for a setup.
+/// A proof has one realization, and one more for each such number of the evaluation's, so that short jobs can pay
+/// for the proofs of several hosts: nine hosts and 2,747 realizations spend 3.3 % on them, once for a setup.
 pub(crate) const PROOF_DIVISOR: u64 = 300;
 /// Setups whose proofs are remembered.
 pub(crate) const PROVEN_SETUPS_MAX: usize = 64;

@@ -12,7 +12,6 @@ use osteon_common::limits::WORKERS_MAX;
 use crate::core::policy::{PROBATION_MEMORY, PROBATION_PAUSE_MAX, PROBATION_PAUSE_MIN};
 use crate::core::worker_name::WorkerName;
 
-/// The workers that are on probation.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Probation(BTreeMap<WorkerName, ProbationRecord>);
 

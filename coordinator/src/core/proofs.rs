@@ -55,7 +55,6 @@ pub(crate) struct SetupProofs {
     input: Arc<EvaluationInput>,
     /// The votes of the hosts.
     pub(crate) ballot: Ballot,
-    /// The batches that are out.
     pub(crate) out: BTreeMap<WorkerId, BatchId>,
     /// The workers that have given theirs, in this stay or an earlier one.
     given: BTreeSet<WorkerName>,
@@ -107,12 +106,10 @@ impl SetupProofs {
 pub(crate) struct Proofs(BTreeMap<SetupKey, SetupProofs>);
 
 impl Proofs {
-    /// Returns the proofs of a setup.
     pub(crate) fn for_setup(&self, setup: &SetupKey) -> Option<&SetupProofs> {
         self.0.get(setup)
     }
 
-    /// As [`Proofs::for_setup`].
     pub(crate) fn for_setup_mut(&mut self, setup: &SetupKey) -> Option<&mut SetupProofs> {
         self.0.get_mut(setup)
     }
@@ -128,7 +125,7 @@ impl Proofs {
         self.with_attempt(attempt).map(|(_, proofs)| Arc::clone(&proofs.input))
     }
 
-    /// Begins the proofs of a setup by realizations of `input`, of which there are so many.
+    /// Begins the proofs of a setup by some of the realizations of `input`, which has `realizations`.
     pub(crate) fn begin(
         &mut self,
         setup: SetupKey,
@@ -136,7 +133,7 @@ impl Proofs {
         now: Duration,
     ) {
         if self.0.len() >= PROVEN_SETUPS_MAX {
-            // Those of setups in use are used all the time.
+            // Proofs of setups in use are touched all the time, so the oldest are of one that is not.
             let unused = self.0.iter().filter(|(_, proofs)| proofs.out.is_empty());
             if let Some(oldest) = unused.min_by_key(|(_, it)| it.used).map(|(setup, _)| *setup) {
                 self.0.remove(&oldest);

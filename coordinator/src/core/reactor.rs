@@ -44,7 +44,7 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
     if frees {
         dispatch::dispatch(&mut turn);
     }
-    if turn.state.draining && turn.state.unstored() == 0 {
+    if turn.state.draining && turn.state.unstored_records() == 0 {
         turn.effects.push(Effect::Stop);
     }
     turn.effects
@@ -53,30 +53,34 @@ pub fn react(state: &mut State, event: Event, now: Duration) -> Vec<Effect> {
 fn apply(turn: &mut Turn, event: Event) {
     match event {
         Event::Tick => tick(turn),
-        Event::Requested { reply_id, request } => requests::requested(turn, reply_id, request),
-        Event::Hello { worker, hello } => workers::hello(turn, worker, hello),
+        Event::Requested { reply_id, request } => requests::handle_request(turn, reply_id, request),
+        Event::Hello { worker, hello } => workers::on_hello(turn, worker, hello),
         Event::Answered { worker, batch, solved, elapsed_s } => {
-            answers::answered(turn, worker, batch, solved, elapsed_s);
+            answers::take_answer(turn, worker, batch, solved, elapsed_s);
         }
-        Event::Heartbeat { worker } => workers::seen(turn.state, worker, turn.now),
-        Event::WorkerDrains { worker } => workers::drains(turn, worker),
+        Event::Heartbeat { worker } => workers::note_sign_of_life(turn.state, worker, turn.now),
+        Event::WorkerDrains { worker } => workers::on_draining(turn, worker),
         Event::Misbehaved { worker, reason } => workers::close(turn, worker, reason),
-        Event::StreamEnded { worker } => workers::stream_ended(turn, worker),
-        Event::Gathered(gathered) => jobs::gathered(turn, gathered),
-        Event::Completed(completed) => records::completed(turn, completed),
-        Event::Stored { key: RecordKey::Ban(number), .. } => bans::stored(turn, number),
+        Event::StreamEnded { worker } => workers::on_stream_ended(turn, worker),
+        Event::Gathered(gathered) => jobs::store_gathered(turn, gathered),
+        Event::Completed(completed) => records::on_completed(turn, completed),
+        Event::Stored { key: RecordKey::Ban(number), .. } => bans::on_ban_stored(turn, number),
         Event::Stored { job, key } => records::on_record_stored(turn, job, key),
         Event::StoreFailed { key: RecordKey::Ban(number), error, .. } => {
-            bans::store_failed(turn, number, error);
+            bans::on_ban_not_stored(turn, number, error);
         }
-        Event::StoreFailed { job, key, error } => records::store_failed(turn, job, key, error),
-        Event::Read { job, number, found } => replay::read(turn, job, number, found),
-        Event::Pruned { reply_id, jobs, outcome } => prune::pruned(turn, reply_id, jobs, outcome),
+        Event::StoreFailed { job, key, error } => {
+            records::on_record_not_stored(turn, job, key, error)
+        }
+        Event::Read { job, number, found } => replay::on_read(turn, job, number, found),
+        Event::Pruned { reply_id, jobs, outcome } => {
+            prune::on_pruned(turn, reply_id, jobs, outcome)
+        }
         Event::Doubted { ban, jobs } => {
             recheck::note_doubts(turn, ban, jobs);
         }
         Event::Reopened { reply_id, job, outcome } => {
-            recheck::reopened(turn, reply_id, job, outcome)
+            recheck::on_reopened(turn, reply_id, job, outcome)
         }
         // Noted for all events.
         Event::Connections { .. } | Event::LogCopied | Event::LogStuck { .. } => {}

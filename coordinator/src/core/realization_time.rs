@@ -27,7 +27,7 @@ impl RealizationTime {
 
     /// Returns the expected time of `count` realizations on a worker with `slots` slots; `None`
     /// before the first answer.
-    pub(crate) fn expected(self, count: u64, slots: u32) -> Option<Duration> {
+    pub(crate) fn expected_time(self, count: u64, slots: u32) -> Option<Duration> {
         self.0.map(|one| fairness::slot_time(one * rounds_per_slot(count, slots), 1))
     }
 }
@@ -44,9 +44,9 @@ mod tests {
     #[test]
     fn slow_answers_count_at_once_and_fast_ones_by_and_by() {
         let mut pace = RealizationTime::default();
-        assert_eq!((pace.expected(8, 2), pace.is_known()), (None, false));
+        assert_eq!((pace.expected_time(8, 2), pace.is_known()), (None, false));
         let expected = |pace: RealizationTime, count, slots| {
-            pace.expected(count, slots).unwrap().as_secs_f64()
+            pace.expected_time(count, slots).unwrap().as_secs_f64()
         };
         // 8 realizations on 2 slots in 2 s: 0.5 s each.
         pace.learn(8, 2, 2.0);

@@ -86,7 +86,7 @@ pub fn sanity_check(state: &State) -> Result<(), Inconsistency> {
     check_jobs(state)?;
     check_workers(state)?;
     check_batches(state)?;
-    if let Some(worker) = state.misplaced() {
+    if let Some(worker) = state.find_misplaced() {
         return Err(Inconsistency::Order(worker));
     }
     for (&id, job) in &state.jobs {
@@ -136,11 +136,11 @@ fn check_jobs(state: &State) -> Result<(), Inconsistency> {
             return Err(Inconsistency::JobList(*id));
         }
     }
-    let lost = |id: &&JobId| !state.jobs.contains_key(id);
-    if let Some(id) = state.active.iter().chain(&state.waiting).find(lost) {
+    let is_lost = |id: &&JobId| !state.jobs.contains_key(id);
+    if let Some(id) = state.active.iter().chain(&state.waiting).find(is_lost) {
         return Err(Inconsistency::JobList(*id));
     }
-    match state.requests.values().find(|id| lost(id) && !state.ended.contains_key(id)) {
+    match state.requests.values().find(|id| is_lost(id) && !state.ended.contains_key(id)) {
         Some(id) => Err(Inconsistency::JobList(*id)),
         None => Ok(()),
     }
@@ -153,8 +153,9 @@ fn check_speculation(job: &Job) -> Result<(), Inconsistency> {
     let under_way = is_under_way(job);
     let bits = |point: &Point| point.0.map(f64::to_bits);
     let points: BTreeSet<_> = job.evaluations().map(|it| bits(&it.point)).collect();
-    let known = |of: &PendingEvaluation| candidates.iter().any(|at| bits(at) == bits(&of.point));
-    let fits = evaluations.iter().all(known)
+    let is_candidate =
+        |of: &PendingEvaluation| candidates.iter().any(|at| bits(at) == bits(&of.point));
+    let fits = evaluations.iter().all(is_candidate)
         && points.len() == job.evaluations().count()
         && candidates.len() <= CANDIDATES_MAX
         && (under_way || candidates.is_empty())
@@ -168,7 +169,7 @@ fn check_ahead(state: &State, job: &Job) -> Result<(), Inconsistency> {
     let Ahead { branches, .. } = &job.ahead;
     let part = job.search.part();
     let mut parts = branches.iter().map(|it| it.part);
-    let at_its_point = |it: &FollowedBranch| {
+    let is_at_its_point = |it: &FollowedBranch| {
         let point = it.branch.point();
         it.evaluation.as_ref().is_none_or(|evaluation| {
             point.is_some_and(|point| same_point(&point, &evaluation.point))
@@ -176,10 +177,10 @@ fn check_ahead(state: &State, job: &Job) -> Result<(), Inconsistency> {
     };
     let banned = state.banned.iter().filter(|banned| banned.record.lifted.is_none());
     let banned = banned.map(|banned| banned.record.worker.host());
-    let mut prepared = job.ahead.all_prepared();
+    let mut prepared = job.ahead.prepared_evaluations();
     let fits = parts.clone().is_sorted()
         && parts.all(|of| of >= part && of < job.ahead.next_part)
-        && branches.iter().all(at_its_point)
+        && branches.iter().all(is_at_its_point)
         && (is_under_way(job) || job.ahead.evaluations().next().is_none())
         && prepared.all(|it| banned.clone().all(|host| !WorkerName::any_of(&it.workers, host)));
     if fits { Ok(()) } else { Err(Inconsistency::Ahead(job.record.job)) }
@@ -208,9 +209,9 @@ fn check_checks(
     job: JobId,
     evaluation: &PendingEvaluation,
 ) -> Result<(), Inconsistency> {
-    let with = |purpose: fn(&Purpose) -> bool| {
-        let of = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
-        state.batches.values().filter(of).count()
+    let count_batches = |purpose: fn(&Purpose) -> bool| {
+        let is_counted = |batch: &&Batch| is_of(batch, job, evaluation) && purpose(&batch.purpose);
+        state.batches.values().filter(is_counted).count()
     };
     let judged = |dispute: &Dispute| {
         let tie_breakers =
@@ -222,8 +223,8 @@ fn check_checks(
     };
     let disputes = &evaluation.disputes;
     let tie_breakers: usize = disputes.iter().map(|dispute| dispute.tie_breakers.len()).sum();
-    if with(|purpose| matches!(purpose, Purpose::Audit { .. })) != evaluation.audits_out
-        || with(|purpose| *purpose == Purpose::TieBreak) != tie_breakers
+    if count_batches(|purpose| matches!(purpose, Purpose::Audit { .. })) != evaluation.audits_out
+        || count_batches(|purpose| *purpose == Purpose::TieBreak) != tie_breakers
         || !disputes.iter().all(judged)
     {
         return Err(Inconsistency::Checks(job));
@@ -232,8 +233,8 @@ fn check_checks(
         let host = record.worker.host();
         let attached = WorkerName::any_of(state.workers.values().map(|worker| &worker.name), host);
         let disputes = disputes.iter().any(|dispute| dispute.has_vote_of(host));
-        let of_job = |job: &Job| WorkerName::any_of(&job.workers, host);
-        let told = state.jobs.get(&job).is_some_and(of_job);
+        let includes_host = |job: &Job| WorkerName::any_of(&job.workers, host);
+        let told = state.jobs.get(&job).is_some_and(includes_host);
         if attached || disputes || told || WorkerName::any_of(&evaluation.workers, host) {
             return Err(Inconsistency::Banned(record.worker.clone()));
         }
@@ -297,7 +298,7 @@ fn check_batches(state: &State) -> Result<(), Inconsistency> {
             continue;
         }
         let job = state.jobs.get(&batch.assignment.job);
-        let asked_for = job.is_some_and(|job| job.certain_with(attempt).is_some());
+        let asked_for = job.is_some_and(|job| job.certain_evaluation(attempt).is_some());
         let speculative = job
             .is_some_and(|job| job.speculation.evaluations.iter().any(|it| it.attempt == attempt));
         if asked_for == speculative || (batch.purpose == Purpose::Speculative) != speculative {

@@ -1,5 +1,5 @@
-//! Results of incomplete evaluations: saved while a coordinator runs, as parts, which are used by the next one,
-//! and as pieces, of which the record of the evaluation will consist.
+//! Results of incomplete evaluations. They are saved while a coordinator runs: as parts, which the next coordinator
+//! uses, and as pieces, of which the record of the evaluation will consist.
 //!
 //! A large evaluation takes a while, and so do many that wait for their search to ask for them. If the
 //! coordinator dies, only what was answered last is computed again.
@@ -20,7 +20,6 @@ use crate::store::{PIECE_OUTCOMES, PartPiece, PartRecord, PieceRecord};
 /// A point, to be compared to the bit.
 pub(crate) type PointBits = [u64; PARAMETERS];
 
-/// Returns the bits of a point.
 pub(crate) fn point_bits(point: &Point) -> PointBits {
     point.0.map(f64::to_bits)
 }
@@ -168,7 +167,7 @@ mod tests {
     }
 
     /// Returns the numbers of the pieces that are taken, and checks what is in them.
-    fn taken(evaluation: &mut PendingEvaluation) -> Vec<u64> {
+    fn take_numbers(evaluation: &mut PendingEvaluation) -> Vec<u64> {
         let pieces = take_pieces(evaluation, JobId(5), ObservableSet::NONE);
         for piece in &pieces {
             assert_eq!((piece.job, piece.number), (JobId(5), 3));
@@ -184,15 +183,15 @@ mod tests {
         let mut evaluation = PendingEvaluation::new(3, 7, Point::of_bone([1.0; 7]), 4 * PIECE + 9);
         fill(&mut evaluation, 0, 2 * PIECE - 1);
         fill(&mut evaluation, 3 * PIECE, PIECE);
-        assert_eq!(taken(&mut evaluation), [3]);
+        assert_eq!(take_numbers(&mut evaluation), [3]);
         fill(&mut evaluation, 2 * PIECE - 1, PIECE);
-        assert_eq!(taken(&mut evaluation), [1]);
+        assert_eq!(take_numbers(&mut evaluation), [1]);
         // What is filled already counts once.
         fill(&mut evaluation, 2 * PIECE - 1, PIECE);
-        assert_eq!(taken(&mut evaluation), [0; 0]);
+        assert_eq!(take_numbers(&mut evaluation), [0; 0]);
         // The last one is not full.
         fill(&mut evaluation, 3 * PIECE - 1, PIECE + 10);
-        assert_eq!(taken(&mut evaluation), [2]);
+        assert_eq!(take_numbers(&mut evaluation), [2]);
     }
 
     #[test]
@@ -200,6 +199,6 @@ mod tests {
         let mut evaluation = PendingEvaluation::new(3, 7, Point::of_bone([1.0; 7]), 3 * PIECE);
         evaluation.stored = StoredRecord::Damaged;
         fill(&mut evaluation, 0, 3 * PIECE);
-        assert_eq!(taken(&mut evaluation), [0; 0]);
+        assert_eq!(take_numbers(&mut evaluation), [0; 0]);
     }
 }

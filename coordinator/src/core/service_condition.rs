@@ -35,7 +35,7 @@ pub(crate) struct StoreRefusal {
     pub(crate) error: String,
 }
 
-/// The store's log, which could not be copied into the database.
+/// The log of the store's database, as long as it cannot be copied into the database.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StuckLog {
     pub(crate) since: Duration,
@@ -49,9 +49,9 @@ pub(crate) struct ServiceCondition {
     pub(crate) connections: (u64, u64),
     pub(crate) refusal: Option<StoreRefusal>,
     pub(crate) stuck_log: Option<StuckLog>,
-    /// What the log has been told of, and what is not over yet.
+    /// The concerns that were written to the program's log and are not over yet.
     pub(crate) told: BTreeSet<ConcernKind>,
-    /// Time of the last look for something to tell.
+    /// Time when new concerns were last looked for.
     pub(crate) looked: Duration,
 }
 

@@ -16,7 +16,7 @@ pub(crate) struct ServicePlace {
     pub(crate) held: usize,
     /// Number of batches that it holds.
     pub(crate) in_flight: usize,
-    /// Ties go to the first.
+    /// Among equal workers, the one that attached first.
     pub(crate) worker: WorkerId,
 }
 
@@ -28,7 +28,6 @@ pub(crate) struct ServiceOrder {
 }
 
 impl ServiceOrder {
-    /// Returns the place of a worker.
     pub(crate) fn place(&self, worker: WorkerId) -> Option<ServicePlace> {
         self.places.get(&worker).copied()
     }
@@ -61,8 +60,8 @@ impl ServiceOrder {
         self.order.range(first..).map(|place| place.worker)
     }
 
-    /// Gives a worker its place, or none.
-    pub(crate) fn put(&mut self, worker: WorkerId, place: Option<ServicePlace>) {
+    /// Gives a worker this place; with `None`, removes it from the order.
+    pub(crate) fn set_place(&mut self, worker: WorkerId, place: Option<ServicePlace>) {
         let before = match place {
             Some(place) => self.places.insert(worker, place),
             None => self.places.remove(&worker),

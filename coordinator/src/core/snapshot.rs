@@ -19,7 +19,7 @@ const UNFIT_SHOWN_MAX: usize = 3;
 /// Returns the snapshot of `id` at `now`; `None` if no client can know the job yet.
 pub(crate) fn job_snapshot(state: &State, id: JobId, now: Duration) -> Option<JobSnapshot> {
     if let Some(job) = state.ended.get(&id) {
-        return Some(ended(state, job));
+        return Some(ended_snapshot(state, job));
     }
     let job = state.jobs.get(&id)?;
     let specification = &job.record.specification;
@@ -58,7 +58,7 @@ pub(crate) fn job_snapshot(state: &State, id: JobId, now: Duration) -> Option<Jo
     Some(snapshot)
 }
 
-fn ended(state: &State, job: &EndedJob) -> JobSnapshot {
+fn ended_snapshot(state: &State, job: &EndedJob) -> JobSnapshot {
     let end = &job.end;
     let mut snapshot = JobSnapshot {
         job: end.job.to_string(),
@@ -104,11 +104,11 @@ fn under_way(state: &State, job: &Job, now: Duration, snapshot: &mut JobSnapshot
     snapshot.best_coefficient_of_variation =
         moments.map(|moments| moments.coefficient_of_variation);
     snapshot.realizations_per_second = job.rate.per_second(now);
-    snapshot.waiting_for = waiting_for(state, job, now);
+    snapshot.waiting_for = describe_wait(state, job, now);
 }
 
 /// Describes what a job that has not ended waits for; empty if it does not wait.
-fn waiting_for(state: &State, job: &Job, now: Duration) -> String {
+fn describe_wait(state: &State, job: &Job, now: Duration) -> String {
     let since = |then: Duration| format!("(since {} s)", now.saturating_sub(then).as_secs());
     if let Some(store_retry) = &job.store_retry {
         let does = match job.stage {
@@ -197,13 +197,13 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
 /// answer; empty if there are none.
 fn unfit(state: &State) -> String {
     let failing = state.lost_in_a_row.iter().filter(|(host, _)| state.is_failing(host));
-    let named = |(host, lost): (&String, &HostLosses)| {
+    let describe = |(host, lost): (&String, &HostLosses)| {
         format!("the last {} workers of {host} were lost with their batches", lost.workers.len())
     };
     // A worker that holds nothing or has departed is not waited for.
     let holding = state.workers.values().filter(|worker| !worker.in_flight.is_empty());
     let silent = holding.filter(|worker| state.probation.is_silent(&worker.name));
     let silent = silent.map(|worker| format!("{} does not answer its batches", worker.name));
-    let all = failing.map(named).take(UNFIT_SHOWN_MAX).chain(silent.take(UNFIT_SHOWN_MAX));
+    let all = failing.map(describe).take(UNFIT_SHOWN_MAX).chain(silent.take(UNFIT_SHOWN_MAX));
     all.collect::<Vec<_>>().join(", ")
 }

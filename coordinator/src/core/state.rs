@@ -186,7 +186,6 @@ pub(crate) struct EarlyAnswer {
 /// Consecutive batches of a worker that others answered, long after it should have.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct MissedBatches {
-    /// Their number.
     pub(crate) count: u32,
     /// Time when the worker could begin the first of them; meaningless while there is none.
     pub(crate) since: Duration,
@@ -234,30 +233,30 @@ impl State {
 
     /// Returns whether nothing is left to do.
     pub fn is_idle(&self) -> bool {
-        self.active.is_empty() && self.waiting.is_empty() && self.unstored() == 0
+        self.active.is_empty() && self.waiting.is_empty() && self.unstored_records() == 0
     }
 
     /// Returns the number of jobs that have not ended.
-    pub(crate) fn unfinished(&self) -> usize {
+    pub(crate) fn unfinished_jobs(&self) -> usize {
         self.jobs.len()
     }
 
     /// Returns the number of realizations in the evaluations of all active jobs, with speculative ones
     /// and those ahead of their searches.
     pub(crate) fn realizations(&self) -> u64 {
-        let of_job = |id: &JobId| {
+        let count_realizations = |id: &JobId| {
             let job = self.jobs.get(id)?;
             let each = job.record.specification.monte_carlo.realizations;
             let further = job.speculation.evaluations.len() + job.ahead.count();
             Some(each * (1 + further as u64))
         };
-        self.active.iter().filter_map(of_job).sum()
+        self.active.iter().filter_map(count_realizations).sum()
     }
 
     /// Returns the number of records on their way to the store.
-    pub(crate) fn unstored(&self) -> usize {
-        let on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
-        let banned = self.banned.iter().filter(on_its_way).count();
+    pub(crate) fn unstored_records(&self) -> usize {
+        let is_on_its_way = |banned: &&Banned| banned.store_at.is_some() && !banned.refused;
+        let banned = self.banned.iter().filter(is_on_its_way).count();
         let jobs =
             self.jobs.values().filter(|job| job.stage.is_storing() && job.store_retry.is_none());
         jobs.count() + banned
@@ -304,7 +303,6 @@ impl State {
         job.evaluations().find(|found| found.attempt == assignment.attempt)
     }
 
-    /// As [`State::evaluation_of`].
     pub(crate) fn evaluation_of_mut(
         &mut self,
         assignment: &Assignment,
@@ -315,8 +313,8 @@ impl State {
 
     /// Returns the point of an assignment's realizations, while its evaluation is under way, or its proof.
     pub(crate) fn point_of(&self, assignment: &Assignment) -> Option<Point> {
-        let of_proof = || Some(self.proofs.with_attempt(assignment.attempt)?.1.point());
-        self.evaluation_of(assignment).map(|it| it.point).or_else(of_proof)
+        let proof_point = || Some(self.proofs.with_attempt(assignment.attempt)?.1.point());
+        self.evaluation_of(assignment).map(|it| it.point).or_else(proof_point)
     }
 
     /// Returns a number for the next attempt at an evaluation.
@@ -327,8 +325,8 @@ impl State {
 
     /// Returns the ban of a host that has not been lifted.
     pub(crate) fn ban(&self, host: &str) -> Option<&BanRecord> {
-        let of_host = |banned: &&Banned| banned.record.worker.host() == host;
-        let mut records = self.banned.iter().filter(of_host).map(|banned| &banned.record);
+        let is_of_host = |banned: &&Banned| banned.record.worker.host() == host;
+        let mut records = self.banned.iter().filter(is_of_host).map(|banned| &banned.record);
         records.find(|record| record.lifted.is_none())
     }
 
@@ -348,14 +346,14 @@ impl State {
         self.banned.iter().any(|banned| concerns(&banned.record))
     }
 
-    /// Returns the first running job with a setup.
-    pub(crate) fn active_job_of(&self, setup: &SetupKey) -> Option<JobId> {
-        let of_setup = |id: &&JobId| self.jobs.get(id).is_some_and(|job| job.setup == *setup);
-        self.active.iter().find(of_setup).copied()
+    /// Returns the running jobs with a setup, in the order of their identifiers.
+    pub(crate) fn active_jobs_of(&self, setup: &SetupKey) -> impl Iterator<Item = JobId> {
+        let has_setup = |id: &&JobId| self.jobs.get(id).is_some_and(|job| job.setup == *setup);
+        self.active.iter().filter(has_setup).copied()
     }
 
     /// Returns whether any ban is not durable yet.
-    pub(crate) fn ban_pending(&self) -> bool {
+    pub(crate) fn has_pending_ban(&self) -> bool {
         self.banned.iter().any(|banned| banned.store_at.is_some())
     }
 
@@ -417,7 +415,7 @@ impl State {
     /// Returns whether an attached worker of another host answers batches, so that it can check answers.
     pub(crate) fn can_check(&self, host: &str) -> bool {
         let other = |worker: &AttachedWorker| worker.name.host() != host && self.is_checker(worker);
-        self.several_hosts() && !self.draining && self.workers.values().any(other)
+        self.has_several_hosts() && !self.draining && self.workers.values().any(other)
     }
 
     /// Returns whether a worker may check the answers of others: it answers batches. With proofs, that is
@@ -427,7 +425,7 @@ impl State {
     }
 
     /// Returns whether the attached workers are of several hosts.
-    pub(crate) fn several_hosts(&self) -> bool {
+    pub(crate) fn has_several_hosts(&self) -> bool {
         self.hosts.len() > 1
     }
 

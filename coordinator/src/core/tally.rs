@@ -48,7 +48,7 @@ pub(crate) struct EventCounts {
 }
 
 /// Returns the number of evaluations in the record that a job is storing.
-fn stored_together(state: &State, job: JobId) -> u64 {
+fn evaluations_in_record(state: &State, job: JobId) -> u64 {
     match state.jobs.get(&job).map(|job| &job.stage) {
         Some(Stage::StoringPrepared { records, .. }) => records.len() as u64,
         _ => 1,
@@ -93,7 +93,7 @@ impl EventTally {
     }
 
     /// Counts an event before the state reacts to it.
-    pub(crate) fn before(&mut self, state: &State, event: &Event, now: Duration) -> Before {
+    pub(crate) fn count_event(&mut self, state: &State, event: &Event, now: Duration) -> Before {
         let mut disputes = None;
         match event {
             Event::Answered { worker, batch, solved, .. } => {
@@ -102,7 +102,7 @@ impl EventTally {
                     .map(|assignment| (assignment, disputes_in(state, &assignment)));
             }
             Event::Stored { job, key: RecordKey::Evaluation(_) } => {
-                self.counts.evaluations += stored_together(state, *job);
+                self.counts.evaluations += evaluations_in_record(state, *job);
                 if let Some(since) = self.evaluating.get_mut(job) {
                     self.counts.evaluation_times.add(now.saturating_sub(*since));
                     *since = now;
@@ -117,7 +117,7 @@ impl EventTally {
     }
 
     /// Counts what a reaction has changed, and its effects.
-    pub(crate) fn after(
+    pub(crate) fn count_reaction(
         &mut self,
         before: &Before,
         state: &State,
@@ -129,11 +129,11 @@ impl EventTally {
             self.counts.mismatches += new as u64;
         }
         self.counts.bans += state.banned.len().saturating_sub(before.bans) as u64;
-        self.effects(state, effects, now);
+        self.count_effects(state, effects, now);
     }
 
-    /// EventCounts effects.
-    pub(crate) fn effects(&mut self, state: &State, effects: &[Effect], now: Duration) {
+    /// Counts effects.
+    pub(crate) fn count_effects(&mut self, state: &State, effects: &[Effect], now: Duration) {
         for effect in effects {
             match effect {
                 Effect::Send { batch, .. } => {
@@ -175,7 +175,7 @@ impl EventTally {
         }
     }
 
-    /// EventCounts the realizations of an answer if they fill an evaluation: those of duplicates, audits
+    /// Counts the realizations of an answer if they fill an evaluation: those of duplicates, audits
     /// and late answers are only compared.
     fn fill(&mut self, state: &State, worker: WorkerId, id: BatchId, solved: &[RealizationResult]) {
         let held = state.batches.get(&id).filter(|batch| batch.worker == worker);

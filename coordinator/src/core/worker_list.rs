@@ -12,7 +12,7 @@ use crate::core::state::{AttachedWorker, Departed, State};
 pub(crate) fn all(state: &State, now: Duration) -> ListWorkersResponse {
     ListWorkersResponse {
         workers: state.workers.iter().map(|(id, it)| snapshot(state, *id, it, now)).collect(),
-        departed: state.departed.iter().rev().map(departed).collect(),
+        departed: state.departed.iter().rev().map(departed_worker).collect(),
     }
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn worker_state(state: &State, worker: &AttachedWorker) -> WorkerStat
     }
 }
 
-fn departed(gone: &Departed) -> DepartedWorker {
+fn departed_worker(gone: &Departed) -> DepartedWorker {
     DepartedWorker {
         worker: gone.worker.0,
         host: gone.name.host().to_owned(),

@@ -19,8 +19,8 @@ impl WorkerName {
     /// Returns the name of process `process` on `host` that drew `instance`, 0 if none; invisible
     /// characters in the host name are replaced.
     pub fn new(host: &str, process: u32, instance: u64) -> Self {
-        let shown = |c: char| if visible::is_hidden(c) { '?' } else { c };
-        Self { host: host.chars().map(shown).collect::<String>().into(), process, instance }
+        let show = |c: char| if visible::is_hidden(c) { '?' } else { c };
+        Self { host: host.chars().map(show).collect::<String>().into(), process, instance }
     }
 
     /// Returns whether any of these workers is of this host.

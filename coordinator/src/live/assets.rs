@@ -17,7 +17,6 @@ const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src '
 /// Paths of the files.
 pub(crate) const PATHS: [&str; 5] = ["/", "/page.css", "/page.js", "/charts.js", "/icon.svg"];
 
-/// Returns the file at a path.
 pub(crate) fn file(path: &str) -> Option<Response> {
     let (kind, text) = match path {
         "/" => ("text/html; charset=utf-8", include_str!("page/page.html").to_owned()),

@@ -15,8 +15,9 @@ use crate::core::effect::{Answer, SearchRows};
 use crate::core::event::Request;
 use crate::core::ids::JobId;
 use crate::live::json;
-use crate::live::source::{PageSource, unexpected};
+use crate::live::source::PageSource;
 use crate::service::fetching;
+use crate::service::no_answer::unexpected_status;
 use crate::store::job_output::ReadRequest;
 
 /// Maximum number of rows that are read at a time: what the core copies for one update.
@@ -26,7 +27,6 @@ const READINGS_MAX: usize = 8;
 /// Maximum number of groups that are named.
 const GROUPS_MAX: usize = 200;
 
-/// A search that is followed.
 pub(crate) struct FollowedSearch {
     job: JobId,
     /// The group that is wanted; the one that the search is at, if none is.
@@ -102,7 +102,7 @@ impl FollowedSearch {
                 (self.add(specification, new), rows.len() == ROWS_MAX)
             }
             Answer::Ended { .. } => {
-                let _permit = source.reading(caller).await?;
+                let _permit = source.permit_reading(caller).await?;
                 let job = self.job;
                 let record = fetching::read(&source.store, |to| ReadRequest::Job(job, to)).await?;
                 let summary = fetching::read(&source.store, |to| ReadRequest::Summary(job, to));
@@ -111,7 +111,7 @@ impl FollowedSearch {
                 self.seen = None;
                 (self.add(record.specification, &rows), false)
             }
-            _ => return Err(unexpected()),
+            _ => return Err(unexpected_status()),
         };
         if is_other_set {
             self.summarize().await;
@@ -123,8 +123,8 @@ impl FollowedSearch {
     fn add(&mut self, specification: Arc<JobSpecification>, rows: &[Evaluation]) -> bool {
         let mut is_new = self.seen.is_none();
         self.is_stale |= is_new || !rows.is_empty();
-        let begun = |specification: Arc<JobSpecification>, set: usize| SeenRows {
-            course: SearchCourse::of_job(&specification, set),
+        let begin = |specification: Arc<JobSpecification>, set: usize| SeenRows {
+            course: SearchCourse::for_job(&specification, set),
             specification,
             set,
             count: 0,
@@ -132,12 +132,12 @@ impl FollowedSearch {
             failures: FailureCounts::default(),
         };
         let first = self.wanted.unwrap_or(0);
-        let seen = self.seen.get_or_insert_with(|| begun(specification, first));
+        let seen = self.seen.get_or_insert_with(|| begin(specification, first));
         for row in rows {
             let set = row.role.group as usize;
             if set != seen.set && self.wanted.is_none() {
                 let count = seen.count;
-                *seen = SeenRows { count, ..begun(Arc::clone(&seen.specification), set) };
+                *seen = SeenRows { count, ..begin(Arc::clone(&seen.specification), set) };
                 is_new = true;
             }
             if set == seen.set {

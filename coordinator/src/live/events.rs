@@ -69,7 +69,7 @@ impl PageFeed {
             let Ok(parts) = self.parts().await else { return };
             let mut text = String::new();
             for (name, part) in parts {
-                text.push_str(&self.sent.changed(name, part));
+                text.push_str(&self.sent.change_event(name, part));
             }
             quiet = if text.is_empty() { quiet + 1 } else { 0 };
             if quiet >= QUIET_MAX {
@@ -131,7 +131,7 @@ struct SentParts(Vec<(&'static str, Arc<str>)>);
 
 impl SentParts {
     /// Returns the event of a part, empty if it has not changed.
-    fn changed(&mut self, name: &'static str, text: Arc<str>) -> String {
+    fn change_event(&mut self, name: &'static str, text: Arc<str>) -> String {
         match self.0.iter_mut().find(|(known, _)| *known == name) {
             Some((_, known)) if *known == text => return String::new(),
             Some((_, known)) => *known = Arc::clone(&text),
@@ -164,7 +164,7 @@ mod tests {
             ("jobs", "2", "event: jobs\ndata: 2\n\n"),
             ("job", "1", ""),
         ] {
-            assert_eq!(sent.changed(name, text.into()), expected, "{name} {text}");
+            assert_eq!(sent.change_event(name, text.into()), expected, "{name} {text}");
         }
     }
 }

@@ -16,7 +16,7 @@ use tokio::sync::watch;
 use tonic::Status;
 
 use crate::access::{
-    self, AccessDenied, Certificate, HolderName, Policy, Presented, Requirement, page_need,
+    self, AccessDenied, Certificate, HolderName, Policy, Presented, Requirement, page_requirement,
 };
 use crate::live::assets;
 use crate::live::json;
@@ -24,7 +24,6 @@ use crate::live::json;
 /// Path of the requirement to cancel jobs.
 const CANCEL: &str = "/data/jobs/0/cancel";
 
-/// The gate.
 #[derive(Debug, Clone)]
 pub(crate) struct Gate {
     /// Read for each request, because it may be replaced while the coordinator runs.
@@ -36,15 +35,12 @@ pub(crate) struct Gate {
 /// Why a request is not answered.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub(crate) enum GateRefusal {
-    /// The host may be another's, whose name leads here.
+    /// The request names a host that may be somebody else's, although the name leads here.
     #[error(
         "the host {host:?} is not known: the page answers for addresses, localhost and the name of this \
          machine; other names need --http-host NAME, or a coordinator with tokens"
     )]
-    UnknownHost {
-        /// The host.
-        host: String,
-    },
+    UnknownHost { host: String },
     /// Another page sent the request.
     #[error("the request comes from another page; open the live page itself")]
     CrossSite,
@@ -63,7 +59,7 @@ pub(crate) struct PageCaller {
 impl PageCaller {
     /// Returns whether the caller may see what a path shows, by the tokens of this moment.
     pub(crate) fn may(&self, path: &str) -> Result<Option<HolderName>, AccessDenied> {
-        self.gate.decide(self.authorization.as_ref(), page_need(path))
+        self.gate.decide(self.authorization.as_ref(), page_requirement(path))
     }
 
     /// Returns whether the caller may cancel jobs.
@@ -96,7 +92,7 @@ impl Gate {
         &self,
         request: &axum::http::Request<B>,
     ) -> Result<Option<HolderName>, GateRefusal> {
-        let (headers, need) = (request.headers(), page_need(request.uri().path()));
+        let (headers, need) = (request.headers(), page_requirement(request.uri().path()));
         let host = host_of(request).unwrap_or("");
         // With tokens, a page under another name has none: browsers keep them by origin.
         let open = matches!(**self.policy.borrow(), Policy::Everybody);
@@ -124,16 +120,16 @@ pub(crate) async fn guard(State(gate): State<Gate>, mut request: Request, next: 
         }
         Err(refusal) => {
             tracing::debug!(path = request.uri().path(), %refusal, "a request of a page was refused");
-            refused(&refusal)
+            refusal_response(&refusal)
         }
     };
     assets::protect(&mut response);
     response
 }
 
-fn refused(refusal: &GateRefusal) -> Response {
+fn refusal_response(refusal: &GateRefusal) -> Response {
     match refusal {
-        GateRefusal::Denied(denied) => json::failed(&Status::from(denied.clone())),
+        GateRefusal::Denied(denied) => json::refusal_response(&Status::from(denied.clone())),
         GateRefusal::UnknownHost { .. } => {
             json::error(StatusCode::MISDIRECTED_REQUEST, &refusal.to_string())
         }

@@ -28,7 +28,6 @@ macro_rules! unix_s {
     };
 }
 
-/// Returns an answer.
 pub(crate) fn answer(code: StatusCode, value: &Value) -> Response {
     let mut response = Response::new(Body::from(value.to_string()));
     *response.status_mut() = code;
@@ -42,7 +41,7 @@ pub(crate) fn error(code: StatusCode, message: &str) -> Response {
 }
 
 /// Returns the answer to a request that a service refused.
-pub(crate) fn failed(refusal: &Status) -> Response {
+pub(crate) fn refusal_response(refusal: &Status) -> Response {
     let code = match refusal.code() {
         Code::InvalidArgument => StatusCode::BAD_REQUEST,
         Code::NotFound => StatusCode::NOT_FOUND,
@@ -60,7 +59,6 @@ pub(crate) fn failed(refusal: &Status) -> Response {
     response
 }
 
-/// Returns a job.
 pub(crate) fn job(snapshot: &JobSnapshot) -> Value {
     let state = match snapshot.state() {
         JobState::Waiting => "waiting",
@@ -109,7 +107,6 @@ pub(crate) fn explanation(explained: &ExplainResponse) -> Value {
     })
 }
 
-/// Returns figures.
 pub(crate) fn figures(figures: &[LiveFigure]) -> Value {
     let figure = |figure: &LiveFigure| {
         let LiveFigure { name, title, svg, reading } = figure;
@@ -158,7 +155,7 @@ pub(crate) fn workers(listed: &ListWorkersResponse) -> Value {
             "not_ok": load.unwell,
         })
     };
-    let departed = |gone: &DepartedWorker| {
+    let departed_worker = |gone: &DepartedWorker| {
         json!({
             "host": gone.host,
             "process": gone.process,
@@ -172,7 +169,7 @@ pub(crate) fn workers(listed: &ListWorkersResponse) -> Value {
         "realizations_per_second": rate,
         "hosts": largest.iter().take(HOSTS_MAX).map(host).collect::<Vec<_>>(),
         "more_hosts": count.saturating_sub(HOSTS_MAX),
-        "departed": listed.departed.iter().take(DEPARTED_MAX).map(departed).collect::<Vec<_>>(),
+        "departed": listed.departed.iter().take(DEPARTED_MAX).map(departed_worker).collect::<Vec<_>>(),
     })
 }
 
@@ -219,9 +216,9 @@ mod tests {
             (Status::unavailable("a"), 503),
             (Status::internal("a"), 500),
         ] {
-            assert_eq!(failed(&refusal).status(), code, "{refusal}");
+            assert_eq!(refusal_response(&refusal).status(), code, "{refusal}");
         }
         let full = status::resource_exhausted("a", std::time::Duration::from_secs(5));
-        assert_eq!(failed(&full).headers()[RETRY_AFTER], "5");
+        assert_eq!(refusal_response(&full).headers()[RETRY_AFTER], "5");
     }
 }

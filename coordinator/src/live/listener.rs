@@ -157,7 +157,7 @@ impl Listener {
 
 /// Serves until the future is dropped, which closes every connection.
 async fn serve(listener: PageListener, tls: Option<watch::Receiver<Tls>>, router: Router) {
-    let mut acceptor = Acceptor::of_pages(listener.listener, tls, CONNECTIONS_MAX);
+    let mut acceptor = Acceptor::for_pages(listener.listener, tls, CONNECTIONS_MAX);
     let mut connections = Connections::default();
     loop {
         let connection = acceptor.next().await;

@@ -38,24 +38,28 @@ impl Shown {
         let mut shown = Self::default();
         for pair in query.split('&').filter(|pair| !pair.is_empty()) {
             let (key, value) = pair.split_once('=').unwrap_or((pair, ""));
-            let wrong = |allowed: &str| format!("{key} is {value:?}; {allowed}");
+            let describe_fault = |allowed: &str| format!("{key} is {value:?}; {allowed}");
             let job = || {
-                JobId::parse(value).map(Some).ok_or_else(|| wrong("it must be the number of a job"))
+                JobId::parse(value)
+                    .map(Some)
+                    .ok_or_else(|| describe_fault("it must be the number of a job"))
             };
             match key {
                 "show" => {
                     let named = JOB_CHOICES.iter().find(|(name, _)| *name == value);
                     let names = "it must be all, running, waiting or ended";
-                    shown.which = named.ok_or_else(|| wrong(names))?.1;
+                    shown.which = named.ok_or_else(|| describe_fault(names))?.1;
                 }
                 "before" => shown.before = job()?,
                 "job" => shown.job = job()?,
                 "rows" => {
                     let rows = value.parse().ok().filter(|rows| (1..=ROWS_MAX).contains(rows));
-                    shown.rows = rows.ok_or_else(|| wrong("it must be from 1 to 100"))?;
+                    shown.rows = rows.ok_or_else(|| describe_fault("it must be from 1 to 100"))?;
                 }
                 "group" => {
-                    let set = value.parse().map_err(|_| wrong("it must be the number of a group"));
+                    let set = value
+                        .parse()
+                        .map_err(|_| describe_fault("it must be the number of a group"));
                     shown.group = Some(set?);
                 }
                 _ => {

@@ -43,14 +43,14 @@ pub(crate) fn router(source: Arc<PageSource>, gate: Gate) -> Router {
         .route("/data/jobs/{job}/figures", get(figures))
         .route("/data/jobs/{job}/cancel", post(cancel))
         .route("/events", get(stream))
-        .fallback(unknown)
-        .method_not_allowed_fallback(wrong_method)
+        .fallback(answer_unknown_path)
+        .method_not_allowed_fallback(answer_wrong_method)
         .with_state(source)
         .layer(from_fn_with_state(gate, gate::guard))
 }
 
 async fn overview_data(State(source): SharedSource) -> Response {
-    answered(overview::newest(&source).await.and_then(|text| {
+    respond(overview::newest(&source).await.and_then(|text| {
         serde_json::from_str(&text).map_err(|error| Status::internal(error.to_string()))
     }))
 }
@@ -60,14 +60,14 @@ async fn jobs(State(source): SharedSource, RawQuery(query): RawQuery) -> Respons
         Ok(shown) => shown,
         Err(error) => return json::error(StatusCode::BAD_REQUEST, &error),
     };
-    answered(source.list(&shown).await.map(|(snapshots, more_after)| {
+    respond(source.list(&shown).await.map(|(snapshots, more_after)| {
         json::jobs(&snapshots, more_after.map(|job| job.to_string()))
     }))
 }
 
 async fn job(State(source): SharedSource, Path(job): Path<String>) -> Response {
-    let Some(id) = JobId::parse(&job) else { return no_job(&job) };
-    answered(events::detail(&source, id).await)
+    let Some(id) = JobId::parse(&job) else { return no_job_response(&job) };
+    respond(events::detail(&source, id).await)
 }
 
 async fn figures(
@@ -75,10 +75,10 @@ async fn figures(
     Path(job): Path<String>,
     request: Request,
 ) -> Response {
-    let Some(id) = JobId::parse(&job) else { return no_job(&job) };
+    let Some(id) = JobId::parse(&job) else { return no_job_response(&job) };
     let reader = Caller::from_extensions(request.extensions());
     let mut search = FollowedSearch::new(id, None);
-    answered(search.figures(&source, reader).await.cloned())
+    respond(search.figures(&source, reader).await.cloned())
 }
 
 async fn cancel(
@@ -88,7 +88,7 @@ async fn cancel(
 ) -> Response {
     let holder = holder.map(|Extension(holder)| holder);
     let snapshot = source.cancel(job, holder).await;
-    answered(snapshot.map(|snapshot| snapshot.as_ref().map_or(Value::Null, json::job)))
+    respond(snapshot.map(|snapshot| snapshot.as_ref().map_or(Value::Null, json::job)))
 }
 
 async fn stream(
@@ -103,7 +103,7 @@ async fn stream(
     };
     let permit = match source.stream() {
         Ok(permit) => permit,
-        Err(refusal) => return json::failed(&refusal),
+        Err(refusal) => return json::refusal_response(&refusal),
     };
     let reader = Caller::from_extensions(request.extensions());
     let updates = events::updates(source, shown, caller, reader, permit);
@@ -114,11 +114,11 @@ async fn stream(
     response
 }
 
-async fn unknown(uri: Uri) -> Response {
+async fn answer_unknown_path(uri: Uri) -> Response {
     json::error(StatusCode::NOT_FOUND, &format!("there is nothing at {:?}", uri.path()))
 }
 
-async fn wrong_method(uri: Uri) -> Response {
+async fn answer_wrong_method(uri: Uri) -> Response {
     let allowed = if uri.path().ends_with("/cancel") { "POST" } else { "GET, HEAD" };
     let message = format!("{} takes {allowed} only", uri.path());
     let mut response = json::error(StatusCode::METHOD_NOT_ALLOWED, &message);
@@ -126,13 +126,13 @@ async fn wrong_method(uri: Uri) -> Response {
     response
 }
 
-fn no_job(job: &str) -> Response {
+fn no_job_response(job: &str) -> Response {
     json::error(StatusCode::NOT_FOUND, &format!("no such job: {job:?}"))
 }
 
-fn answered(answer: Result<Value, Status>) -> Response {
+fn respond(answer: Result<Value, Status>) -> Response {
     match answer {
         Ok(value) => json::answer(StatusCode::OK, &value),
-        Err(refusal) => json::failed(&refusal),
+        Err(refusal) => json::refusal_response(&refusal),
     }
 }

@@ -24,13 +24,14 @@ use crate::metrics::write_times::WriteTimes;
 use crate::service::core_task::Message;
 use crate::service::jobs::JobsService;
 use crate::service::meter::CoreReport;
+use crate::service::no_answer::{stopped_status, unexpected_status};
 use crate::store::thread::StoreCommand;
 
 /// Maximum number of pages that are kept up to date at a time.
 const STREAMS_MAX: usize = 64;
 /// Time after which a page that was refused may ask again.
 const RETRY: Duration = Duration::from_secs(5);
-/// Time limit for an answer of the core task, but for a cancellation, which has its own.
+/// Time limit for an answer of the core task, except to a cancellation, which has its own.
 const CORE_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Where the numbers come from.
@@ -82,7 +83,7 @@ impl PageSource {
     }
 
     /// Waits for the permit to read the history of an ended job, which may be large.
-    pub(crate) async fn reading(
+    pub(crate) async fn permit_reading(
         &self,
         caller: Caller,
     ) -> Result<crate::access::limiter::Permit, Status> {
@@ -91,7 +92,7 @@ impl PageSource {
 
     /// Asks the core.
     pub(crate) async fn ask(&self, request: event::Request) -> Result<Answer, Status> {
-        within(self.jobs.ask(request)).await
+        answer_in_time(self.jobs.ask(request)).await
     }
 
     /// Returns a page of jobs, and the last one if others follow.
@@ -102,22 +103,22 @@ impl PageSource {
         let Shown { which, before, rows, .. } = *shown;
         match self.ask(event::Request::Browse { which, before, limit: rows }).await? {
             Answer::Page { snapshots, more_after } => Ok((snapshots, more_after)),
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
     /// Returns one job, and what decides how fast it is.
     pub(crate) async fn job(&self, job: JobId) -> Result<(JobSnapshot, ExplainResponse), Status> {
         let Answer::Snapshot(snapshot) = self.ask(event::Request::Get(job)).await? else {
-            return Err(unexpected());
+            return Err(unexpected_status());
         };
         let explained = self.jobs.explain(Request::new(ExplainRequest { job: job.to_string() }));
-        Ok((snapshot, within(explained).await?.into_inner()))
+        Ok((snapshot, answer_in_time(explained).await?.into_inner()))
     }
 
     /// Returns what an operator should know.
     pub(crate) async fn concerns(&self) -> Result<Vec<String>, Status> {
-        within(self.jobs.concerns()).await
+        answer_in_time(self.jobs.concerns()).await
     }
 
     /// Cancels a job for the holder of a token.
@@ -133,10 +134,9 @@ impl PageSource {
         Ok(self.jobs.cancel(request).await?.into_inner().snapshot)
     }
 
-    /// Returns the workers.
     pub(crate) async fn workers(&self) -> Result<ListWorkersResponse, Status> {
         let listed = self.jobs.list_workers(Request::new(ListWorkersRequest {}));
-        Ok(within(listed).await?.into_inner())
+        Ok(answer_in_time(listed).await?.into_inner())
     }
 
     /// Returns counts and measurements of the core, and the number of events that wait for it.
@@ -144,23 +144,15 @@ impl PageSource {
         let waiting = self.messages.max_capacity() - self.messages.capacity();
         let (reply, report) = oneshot::channel();
         let asked = async {
-            self.messages.send(Message::Measure(reply)).await.map_err(|_| stopped())?;
-            report.await.map_err(|_| stopped())
+            self.messages.send(Message::Measure(reply)).await.map_err(|_| stopped_status())?;
+            report.await.map_err(|_| stopped_status())
         };
-        Ok((within(asked).await?, waiting))
+        Ok((answer_in_time(asked).await?, waiting))
     }
 }
 
-async fn within<T>(answer: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
-    let late = || Status::unavailable("the coordinator does not answer; its log may say why");
-    timeout(CORE_TIMEOUT, answer).await.map_err(|_| late())?
-}
-
-fn stopped() -> Status {
-    Status::unavailable("the coordinator has stopped; try again when it is back")
-}
-
-/// The core gave an answer of another type than requested.
-pub(crate) fn unexpected() -> Status {
-    Status::internal("the coordinator gave an answer of another type than requested")
+async fn answer_in_time<T>(answer: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
+    let late_status =
+        || Status::unavailable("the coordinator does not answer; its log may say why");
+    timeout(CORE_TIMEOUT, answer).await.map_err(|_| late_status())?
 }

@@ -38,12 +38,14 @@ impl Collector for AllFamilies {
             let mut metric = encoder.encode_descriptor(name, help, None, kind)?;
             match values {
                 Values::Counter(values) => {
-                    labelled(&mut metric, values, |metric, value| {
+                    encode_labelled(&mut metric, values, |metric, value| {
                         metric.encode_counter::<NoLabelSet, f64, u64>(value, None)
                     })?;
                 }
                 Values::Gauge(values) => {
-                    labelled(&mut metric, values, |metric, value| metric.encode_gauge(value))?;
+                    encode_labelled(&mut metric, values, |metric, value| {
+                        metric.encode_gauge(value)
+                    })?;
                 }
                 Values::Histogram(times) => {
                     let buckets: Vec<(f64, u64)> = times.buckets().collect();
@@ -60,7 +62,7 @@ impl Collector for AllFamilies {
     }
 }
 
-fn labelled(
+fn encode_labelled(
     metric: &mut MetricEncoder<'_>,
     values: &[(Label, f64)],
     encode: impl Fn(&mut MetricEncoder<'_>, &f64) -> fmt::Result,

@@ -30,7 +30,7 @@ pub(crate) struct Scrape {
 /// One metric, with a value for each of its labels.
 #[derive(Debug)]
 pub(crate) struct MetricFamily {
-    /// Complete name, but for the suffix `_total` of a counter.
+    /// Complete name, except for the suffix `_total` of a counter.
     pub(crate) name: &'static str,
     pub(crate) help: &'static str,
     pub(crate) values: Values,
@@ -50,17 +50,17 @@ pub(crate) enum Values {
 
 /// Returns all metrics in the order in which they are exported.
 pub(crate) fn families(scrape: &Scrape) -> Vec<MetricFamily> {
-    let mut all = of_state(&scrape.state);
-    all.extend(of_limits(&scrape.state));
-    all.extend(of_work(&scrape.counts));
-    all.extend(of_workers(&scrape.counts));
-    all.extend(of_coordinator(scrape));
-    all.extend(of_process(scrape));
+    let mut all = state_families(&scrape.state);
+    all.extend(limit_families(&scrape.state));
+    all.extend(work_families(&scrape.counts));
+    all.extend(worker_families(&scrape.counts));
+    all.extend(coordinator_families(scrape));
+    all.extend(process_families(scrape));
     all
 }
 
 /// Gauges of jobs, slots and workers.
-fn of_state(state: &StateMeasurements) -> Vec<MetricFamily> {
+fn state_families(state: &StateMeasurements) -> Vec<MetricFamily> {
     vec![
         gauges(
             "osteon_jobs",
@@ -122,7 +122,7 @@ fn of_state(state: &StateMeasurements) -> Vec<MetricFamily> {
 }
 
 /// The used parts of all hard bounds.
-fn bounds_used(state: &StateMeasurements) -> MetricFamily {
+fn bounds_family(state: &StateMeasurements) -> MetricFamily {
     let used = state.bounds_used.iter();
     let values = used.map(|(what, part)| (Some(("bound", what.name())), *part)).collect();
     MetricFamily {
@@ -133,7 +133,7 @@ fn bounds_used(state: &StateMeasurements) -> MetricFamily {
 }
 
 /// Gauges of the store and of all hard bounds.
-fn of_limits(state: &StateMeasurements) -> Vec<MetricFamily> {
+fn limit_families(state: &StateMeasurements) -> Vec<MetricFamily> {
     vec![
         gauge(
             "osteon_store_refusing_seconds",
@@ -150,12 +150,12 @@ fn of_limits(state: &StateMeasurements) -> Vec<MetricFamily> {
             "Length of a log that could not be copied; 0 if it could",
             state.log_stuck_bytes as f64,
         ),
-        bounds_used(state),
+        bounds_family(state),
     ]
 }
 
 /// Counters of jobs, evaluations, realizations and batches.
-fn of_work(counts: &EventCounts) -> Vec<MetricFamily> {
+fn work_families(counts: &EventCounts) -> Vec<MetricFamily> {
     let ended = Status::ALL.map(Status::name).into_iter().zip(counts.jobs_ended);
     let outcomes = ["ok"].into_iter().chain(FailureKind::ALL.map(FailureKind::name));
     let outcomes = outcomes.zip(counts.realizations);
@@ -191,7 +191,7 @@ fn of_work(counts: &EventCounts) -> Vec<MetricFamily> {
 }
 
 /// Counters of workers.
-fn of_workers(counts: &EventCounts) -> Vec<MetricFamily> {
+fn worker_families(counts: &EventCounts) -> Vec<MetricFamily> {
     vec![
         counter("osteon_workers_attached", "Workers that attached", counts.workers_attached),
         counter("osteon_workers_refused", "Workers that were refused", counts.workers_refused),
@@ -206,7 +206,7 @@ fn of_workers(counts: &EventCounts) -> Vec<MetricFamily> {
 }
 
 /// The coordinator's own work.
-fn of_coordinator(scrape: &Scrape) -> Vec<MetricFamily> {
+fn coordinator_families(scrape: &Scrape) -> Vec<MetricFamily> {
     vec![
         counter(
             "osteon_store_errors",
@@ -238,9 +238,9 @@ fn of_coordinator(scrape: &Scrape) -> Vec<MetricFamily> {
 }
 
 /// The process, by the names that are usual for every program.
-fn of_process(scrape: &Scrape) -> Vec<MetricFamily> {
+fn process_families(scrape: &Scrape) -> Vec<MetricFamily> {
     let ProcessUsage { cpu_s, resident_bytes, open_files, open_files_max } = scrape.process;
-    let known = |name, help, value: Option<u64>| Some(gauge(name, help, value? as f64));
+    let known_gauge = |name, help, value: Option<u64>| Some(gauge(name, help, value? as f64));
     let cpu = MetricFamily {
         name: "process_cpu_seconds",
         help: "Processor time of the process",
@@ -251,9 +251,11 @@ fn of_process(scrape: &Scrape) -> Vec<MetricFamily> {
         "Start of the coordinator in seconds since the Unix epoch",
         scrape.started_s,
     );
-    let memory = known("process_resident_memory_bytes", "Memory of the process", resident_bytes);
-    let files = known("process_open_fds", "Open files and connections", open_files);
-    let most = known("process_max_fds", "Limit of open files and connections", open_files_max);
+    let memory =
+        known_gauge("process_resident_memory_bytes", "Memory of the process", resident_bytes);
+    let files = known_gauge("process_open_fds", "Open files and connections", open_files);
+    let most =
+        known_gauge("process_max_fds", "Limit of open files and connections", open_files_max);
     [Some(cpu), Some(started), memory, files, most].into_iter().flatten().collect()
 }
 

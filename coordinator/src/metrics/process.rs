@@ -1,4 +1,4 @@
-//! What this process takes of its machine. What the system does not tell is left out.
+//! Resources that this process uses. What the operating system does not tell is left out.
 
 use std::fs;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -6,7 +6,6 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use rustix::process::{Resource, getrlimit};
 use rustix::time::{ClockId, clock_gettime};
 
-/// Resources that this process uses.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct ProcessUsage {
     /// Processor time so far, s.

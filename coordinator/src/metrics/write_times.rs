@@ -6,12 +6,11 @@ use std::time::Duration;
 use crate::core::distribution::TimeDistribution;
 
 /// The times of all writes, shared by the store's thread and those who read them. A write takes
-/// a thousand times as long as the lock.
+/// a thousand times as long as the lock is held, so the lock delays nobody.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WriteTimes(Arc<Mutex<TimeDistribution>>);
 
 impl WriteTimes {
-    /// Counts a write.
     pub(crate) fn add(&self, time: Duration) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).add(time);
     }

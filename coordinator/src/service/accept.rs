@@ -31,7 +31,6 @@ const REFUSED_WAIT: Duration = Duration::from_millis(100);
 /// Minimum time between two log lines about such failures, or about peers whose connections were ended.
 const COMPLAINT_INTERVAL: Duration = Duration::from_secs(60);
 
-/// A bound socket.
 #[derive(Debug)]
 pub(crate) enum BoundSocket {
     Tcp(TcpListener),
@@ -88,7 +87,7 @@ pub(crate) struct Places {
 
 impl Places {
     /// Returns the places of a coordinator, as many as open files allow.
-    pub(crate) fn of_coordinator() -> Self {
+    pub(crate) fn for_coordinator() -> Self {
         Self::new(open_files::connections_max())
     }
 
@@ -97,7 +96,7 @@ impl Places {
     }
 
     /// Returns how many are taken, and how many there are.
-    pub(crate) fn taken(&self) -> (u64, u64) {
+    pub(crate) fn usage(&self) -> (u64, u64) {
         let taken = self.most.saturating_sub(self.free.available_permits());
         (taken as u64, self.most as u64)
     }
@@ -126,7 +125,7 @@ impl Acceptor {
         not(feature = "live"),
         expect(dead_code, reason = "only the live page is for browsers")
     )]
-    pub(crate) fn of_pages(
+    pub(crate) fn for_pages(
         listener: TcpListener,
         tls: Option<watch::Receiver<Tls>>,
         most: usize,
@@ -134,7 +133,6 @@ impl Acceptor {
         Self { is_of_pages: true, ..Self::new(BoundSocket::Tcp(listener), tls, Places::new(most)) }
     }
 
-    /// Returns the next connection.
     pub(crate) async fn next(&mut self) -> AcceptedConnection {
         loop {
             tokio::select! {
@@ -241,7 +239,7 @@ impl AcceptedConnection {
     /// Looks at what the peer has sent; an error ends the connection.
     fn inspect(&mut self, arrived: &[u8]) -> io::Result<()> {
         let Some(frames) = &mut self.frames else { return Ok(()) };
-        frames.arrived(arrived).map_err(|error| {
+        frames.follow_arrived(arrived).map_err(|error| {
             tell_of_flood(self.number, &error);
             io::Error::new(io::ErrorKind::ConnectionAborted, error)
         })
@@ -250,7 +248,7 @@ impl AcceptedConnection {
     /// Notes what was sent to the peer.
     fn note_sent(&mut self, written: &Poll<io::Result<usize>>) {
         if let (Some(frames), Poll::Ready(Ok(bytes))) = (&mut self.frames, written) {
-            frames.sent(*bytes);
+            frames.note_sent(*bytes);
         }
     }
 }

@@ -13,6 +13,7 @@ use tokio::time::{Instant, sleep, timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
+use crate::service::no_answer::stopped_status;
 use crate::store::StoreError;
 
 /// Number of messages that are prepared before they are read.
@@ -27,7 +28,7 @@ pub(crate) type Copied = Result<Option<File>, StoreError>;
 
 /// Streams the copy. The permit `place` is held until the stream ends; a client that reads nothing
 /// for a while, or takes too long in all, receives no more parts.
-pub(crate) fn streamed(
+pub(crate) fn stream_copy(
     copied: oneshot::Receiver<Copied>,
     place: impl Send + 'static,
 ) -> impl Stream<Item = Result<BackupResponse, Status>> + Send {
@@ -69,7 +70,7 @@ struct PartSender {
 }
 
 impl PartSender {
-    async fn part(&self, part: Part) -> Result<(), Unsent> {
+    async fn send(&self, part: Part) -> Result<(), Unsent> {
         let left = self.until.saturating_duration_since(Instant::now());
         let patience = Duration::from_secs(READER_STALL_SECONDS_MAX).min(left);
         let message = Ok(BackupResponse { part: Some(part) });
@@ -86,7 +87,7 @@ impl PartSender {
 
 /// Waits for the copy and sends it; returns its length.
 async fn send(copied: oneshot::Receiver<Copied>, outgoing: &PartSender) -> Result<u64, Unsent> {
-    let file = finished(copied, outgoing).await?;
+    let file = wait_for_copy(copied, outgoing).await?;
     let unread = |error: std::io::Error| {
         Unsent::Refused(Status::unavailable(format!("the copy cannot be read: {error}")))
     };
@@ -101,29 +102,27 @@ async fn send(copied: oneshot::Receiver<Copied>, outgoing: &PartSender) -> Resul
         }
         digest.update(&data);
         length += data.len() as u64;
-        outgoing.part(Part::Data(data)).await?;
+        outgoing.send(Part::Data(data)).await?;
     }
     let digest = digest.finalize().to_hex().to_string();
-    outgoing.part(Part::End(BackupEnd { length, digest })).await?;
+    outgoing.send(Part::End(BackupEnd { length, digest })).await?;
     Ok(length)
 }
 
 /// Returns the file of the copy when it is complete.
-async fn finished(
+async fn wait_for_copy(
     mut copied: oneshot::Receiver<Copied>,
     outgoing: &PartSender,
 ) -> Result<File, Unsent> {
     loop {
-        outgoing.part(Part::Data(Vec::new())).await?;
+        outgoing.send(Part::Data(Vec::new())).await?;
         tokio::select! {
             copied = &mut copied => {
                 return match copied {
                     Ok(Ok(Some(file))) => Ok(file),
-                    Ok(Err(error)) => Err(Unsent::Refused(refused(&error))),
+                    Ok(Err(error)) => Err(Unsent::Refused(refusal_status(&error))),
                     // The store's thread ends with the coordinator.
-                    Ok(Ok(None)) | Err(_) => Err(Unsent::Refused(Status::unavailable(
-                        "the coordinator has stopped; try again when it is back",
-                    ))),
+                    Ok(Ok(None)) | Err(_) => Err(Unsent::Refused(stopped_status())),
                 };
             }
             () = outgoing.sender.closed() => return Err(Unsent::Gone),
@@ -132,7 +131,7 @@ async fn finished(
     }
 }
 
-fn refused(error: &StoreError) -> Status {
+fn refusal_status(error: &StoreError) -> Status {
     match error {
         StoreError::NoFile => Status::failed_precondition(error.to_string()),
         _ => Status::unavailable(error.to_string()),
@@ -152,7 +151,7 @@ mod tests {
         let (reply, copied) = oneshot::channel();
         let places = std::sync::Arc::new(Semaphore::new(1));
         let place = places.clone().acquire_owned().await;
-        let mut stream = Box::pin(streamed(copied, place));
+        let mut stream = Box::pin(stream_copy(copied, place));
         let begun = Instant::now();
         for _ in 0..5 {
             let part = stream.next().await.unwrap().unwrap().part;
@@ -173,7 +172,7 @@ mod tests {
         file.set_len(100 * PART_BYTES as u64).unwrap();
         reply.send(Ok(Some(file))).unwrap();
         let place = places.clone().acquire_owned().await;
-        let stream = streamed(copied, place);
+        let stream = stream_copy(copied, place);
         drop(places.acquire().await);
         assert!(stream.collect::<Vec<_>>().await.len() <= AHEAD + 1);
     }
@@ -182,7 +181,7 @@ mod tests {
     async fn a_store_in_memory_has_nothing_to_copy() {
         let (reply, copied) = oneshot::channel();
         reply.send(Err(StoreError::NoFile)).unwrap();
-        let parts: Vec<_> = streamed(copied, ()).collect().await;
+        let parts: Vec<_> = stream_copy(copied, ()).collect().await;
         let refused = parts.last().unwrap().as_ref().unwrap_err();
         assert_eq!(refused.code(), Code::FailedPrecondition);
         assert!(refused.message().contains("in memory"), "{refused}");

@@ -17,14 +17,14 @@ use tokio::time::Instant;
 const PERMITS_MAX: u32 = 1000;
 /// Permits that come back in a second.
 const PERMITS_PER_SECOND: u32 = 200;
-/// Bytes sent to a peer that pay for one window update. A thrifty client updates once for some ten thousand
-/// bytes, one that is not updates stream and connection with each message, which is rarely shorter than
-/// twice this.
+/// Bytes sent to a peer that pay for one window update. A thrifty client sends one for some ten thousand
+/// bytes. Another sends two with each message, one for the stream and one for the connection, and a
+/// message is rarely shorter than twice this.
 const BYTES_PER_UPDATE: u32 = 16;
 /// Most window updates that are paid for and have not arrived.
 const UPDATES_MAX: u32 = 65_536;
-/// Length from which on data is data. Every answer of a worker is longer; only heartbeats are
-/// shorter.
+/// Length from which on a frame of data costs no permit. Every answer of a worker is longer; only
+/// heartbeats are shorter.
 const DATA_BYTES_MIN: u32 = 16;
 
 /// First bytes of a connection, before its first frame.
@@ -76,7 +76,7 @@ impl ControlFrames {
     }
 
     /// Notes bytes that were sent to the peer.
-    pub(crate) fn sent(&mut self, bytes: usize) {
+    pub(crate) fn note_sent(&mut self, bytes: usize) {
         let most = UPDATES_MAX * BYTES_PER_UPDATE;
         let unpaid = self.unpaid + u32::try_from(bytes).unwrap_or(most).min(most);
         self.unpaid = unpaid % BYTES_PER_UPDATE;
@@ -87,7 +87,7 @@ impl ControlFrames {
     ///
     /// # Errors
     /// When a control frame in them is one too many.
-    pub(crate) fn arrived(&mut self, mut bytes: &[u8]) -> Result<(), TooManyControlFrames> {
+    pub(crate) fn follow_arrived(&mut self, mut bytes: &[u8]) -> Result<(), TooManyControlFrames> {
         while !bytes.is_empty() {
             if self.skip > 0 {
                 let skipped = bytes.len().min(self.skip as usize);

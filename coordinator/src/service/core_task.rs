@@ -25,7 +25,6 @@ use crate::store::thread::StoreCommand;
 
 /// A message to the core task.
 pub(crate) enum Message {
-    /// An event happened.
     Event(Event),
     /// A client sends a request and waits for the answer.
     Ask(Request, oneshot::Sender<Answer>),
@@ -34,7 +33,11 @@ pub(crate) enum Message {
     /// A client requests to watch a job.
     Watch(JobId, oneshot::Sender<Result<watch::Receiver<v1::JobSnapshot>, Refusal>>),
     /// A worker's stream began; messages to it go to `outbound`.
-    Attach { worker: WorkerId, hello: Hello, outbound: Outbound },
+    Attach {
+        worker: WorkerId,
+        hello: Hello,
+        outbound: Outbound,
+    },
     /// Metrics are to be exported.
     Measure(oneshot::Sender<CoreReport>),
     /// Stop, and report when that is done.
@@ -58,7 +61,7 @@ impl Clock {
     }
 }
 
-/// What follows the events of the core.
+/// What observes the events of the core for operators.
 pub(crate) struct Monitoring {
     /// Present if metrics are exported.
     pub(crate) meter: Option<Meter>,
@@ -71,9 +74,9 @@ pub(crate) struct Core {
     state: State,
     clock: Clock,
     commands: mpsc::Sender<StoreCommand>,
-    /// Leads back to this task.
+    /// Sends events back to this task.
     events: mpsc::Sender<Event>,
-    /// Of the connections of clients and workers.
+    /// Places for the connections of clients and workers.
     places: Places,
     next_reply_id: u64,
     waiting: BTreeMap<ReplyId, oneshot::Sender<Answer>>,
@@ -131,10 +134,10 @@ impl Core {
     ) {
         let mut followups = VecDeque::new();
         if let Some(meter) = &mut self.meter {
-            meter.started(&self.state, &effects, self.clock.now());
+            meter.count_start(&self.state, &effects, self.clock.now());
         }
         if let Some(spans) = &mut self.spans {
-            spans.after(&self.state, &effects, self.clock.now());
+            spans.observe_reaction(&self.state, &effects, self.clock.now());
         }
         self.apply(effects, &mut followups);
         self.handle(followups);
@@ -151,7 +154,7 @@ impl Core {
     }
 
     fn tick(&mut self) {
-        let (open, most) = self.places.taken();
+        let (open, most) = self.places.usage();
         self.handle(VecDeque::from([Event::Connections { open, most }, Event::Tick]));
     }
 
@@ -165,7 +168,7 @@ impl Core {
             Message::Submit(request, client, reply) => {
                 let reply_id = self.expect(reply);
                 if let Some(spans) = &mut self.spans {
-                    spans.submitted(reply_id, client, self.clock.now());
+                    spans.note_submission(reply_id, client, self.clock.now());
                 }
                 self.handle(VecDeque::from([Event::Requested { reply_id, request }]));
             }
@@ -202,14 +205,14 @@ impl Core {
             let now = self.clock.now();
             let reading = self.meter.as_mut().map(|meter| meter.begin(&self.state, &event, now));
             if let Some(spans) = &mut self.spans {
-                spans.before(&event, now);
+                spans.observe_event(&event, now);
             }
             let effects = react(&mut self.state, event, now);
             if let Some(spans) = &mut self.spans {
-                spans.after(&self.state, &effects, now);
+                spans.observe_reaction(&self.state, &effects, now);
             }
             if let Some((meter, reading)) = self.meter.as_mut().zip(reading.as_ref()) {
-                meter.reacted(reading, &self.state, &effects, now);
+                meter.count_reaction(reading, &self.state, &effects, now);
             }
             self.apply(effects, &mut events);
             if let Some((meter, reading)) = self.meter.as_mut().zip(reading) {
@@ -289,7 +292,8 @@ impl Core {
         }
     }
 
-    /// Has the store make an ended job an unfinished one; returns the event that it cannot be asked.
+    /// Asks the store to make an ended job an unfinished one again; returns the event of a failure if the
+    /// store cannot be asked.
     fn reopen(&self, reply_id: ReplyId, job: JobId) -> Option<Event> {
         let refused = self.commands.try_send(StoreCommand::Reopen { reply_id, job }).err()?;
         Some(Event::Reopened { reply_id, job, outcome: Err(refused.to_string()) })
@@ -351,10 +355,10 @@ impl Core {
                 Ok(sender.subscribe())
             }
         };
-        let ended = |receiver: &watch::Receiver<v1::JobSnapshot>| {
+        let has_ended = |receiver: &watch::Receiver<v1::JobSnapshot>| {
             receiver.borrow().state() == v1::JobState::Ended
         };
-        if answer.as_ref().is_ok_and(ended) {
+        if answer.as_ref().is_ok_and(has_ended) {
             self.watching.remove(&job);
         }
         // The client may have gone.

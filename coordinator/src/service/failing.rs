@@ -59,12 +59,12 @@ impl FailureReporter {
 
     /// Reports that the coordinator cannot continue.
     pub(crate) fn report(&self, failed: ComponentFailure) {
-        self.leave_well(Health::Failed(failed));
+        self.change_if_well(Health::Failed(failed));
     }
 
     /// Records that the coordinator is about to be stopped.
     pub(crate) fn disarm(&self) {
-        self.leave_well(Health::Stopping);
+        self.change_if_well(Health::Stopping);
     }
 
     pub(crate) fn guard(&self, part: ComponentFailure) -> Guard {
@@ -75,8 +75,8 @@ impl FailureReporter {
     pub(crate) fn first(&self) -> impl Future<Output = ComponentFailure> + Send + use<> {
         let mut health = self.0.subscribe();
         async move {
-            let failed = |health: &Health| matches!(health, Health::Failed(_));
-            if let Ok(known) = health.wait_for(failed).await
+            let is_failed = |health: &Health| matches!(health, Health::Failed(_));
+            if let Ok(known) = health.wait_for(is_failed).await
                 && let Health::Failed(failed) = &*known
             {
                 return failed.clone();
@@ -86,7 +86,7 @@ impl FailureReporter {
         }
     }
 
-    fn leave_well(&self, next: Health) {
+    fn change_if_well(&self, next: Health) {
         self.0.send_if_modified(|health| {
             // The first failure is the cause of all others.
             let well = matches!(health, Health::Well);

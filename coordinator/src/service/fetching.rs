@@ -1,5 +1,5 @@
-//! Sends the output of an ended job: to a few clients at a time, only as fast as they read, and
-//! while it is being read from the store.
+//! Sends the output of an ended job to a few clients at a time: only as fast as they read it, and while
+//! it is still being read from the store.
 
 use std::pin::pin;
 use std::sync::Arc;
@@ -21,6 +21,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 
 use crate::core::ids::JobId;
+use crate::service::no_answer::stopped_status;
 use crate::store::EndRecord;
 use crate::store::job_output::{OutputError, ReadRequest, Reply, StoredOutput};
 use crate::store::thread::StoreCommand;
@@ -43,10 +44,10 @@ pub(crate) async fn read<T>(
     what: impl FnOnce(Reply<T>) -> ReadRequest,
 ) -> Result<T, Status> {
     let (reply, record) = oneshot::channel();
-    let sender = store.upgrade().ok_or_else(stopped)?;
-    sender.send(StoreCommand::Fetch(what(reply))).await.map_err(|_| stopped())?;
+    let sender = store.upgrade().ok_or_else(stopped_status)?;
+    sender.send(StoreCommand::Fetch(what(reply))).await.map_err(|_| stopped_status())?;
     drop(sender);
-    record.await.map_err(|_| stopped())?.map_err(|error| match error {
+    record.await.map_err(|_| stopped_status())?.map_err(|error| match error {
         OutputError::Pruned { .. } => Status::not_found(error.to_string()),
         _ => Status::data_loss(error.to_string()),
     })
@@ -61,12 +62,8 @@ async fn outcomes(
     read(store, |reply| ReadRequest::Outcomes(job, number, reply)).await.map(Some)
 }
 
-fn stopped() -> Status {
-    Status::unavailable("the coordinator has stopped; try again when it is back")
-}
-
 /// Reads the output of an ended job except its outcomes.
-async fn left(
+async fn read_output(
     store: &mpsc::WeakSender<StoreCommand>,
     end: EndRecord,
 ) -> Result<StoredOutput, Status> {
@@ -76,40 +73,40 @@ async fn left(
     Ok(StoredOutput { end, specification: record.specification, summary })
 }
 
-/// Sends one specification, one result, history blocks, realization blocks and draw blocks; where
-/// the data are groups, also the result with realization and draw blocks of each. The parts are read and made while
-/// they are sent; computations run on a thread of their own.
+/// Sends one specification, one result, then blocks of history, realizations and draws; if the data are
+/// groups, also the result of each with its blocks of realizations and draws. Parts are read and made
+/// while those before them are sent; computations run on a thread of their own.
 pub(crate) async fn send_all(
     store: mpsc::WeakSender<StoreCommand>,
     (end, integrity): (EndRecord, Option<Integrity>),
     reader: FetchStream,
 ) -> Result<(), StreamEnd> {
     let job = end.job;
-    let left = Arc::new(reader.kept_waiting(left(&store, end)).await?);
-    reader.send(Part::Specification(specification::to_message(&left.specification))).await?;
-    let of_best = reader.kept_waiting(outcomes(&store, job, left.best())).await?;
-    let (message, samples) = computed(&left, &reader, move |left| {
-        let result = JobResult { integrity, ..left.result(of_best) };
+    let output = Arc::new(reader.wait_with_heartbeats(read_output(&store, end)).await?);
+    reader.send(Part::Specification(specification::to_message(&output.specification))).await?;
+    let best_outcomes = reader.wait_with_heartbeats(outcomes(&store, job, output.best())).await?;
+    let (message, samples) = compute_on_thread(&output, &reader, move |output| {
+        let result = JobResult { integrity, ..output.result(best_outcomes) };
         let message = v1::JobResult {
             status: JOB_STATUS.number(result.status),
             reason: result.reason.clone(),
-            json: ResultFile::from_job(left.specification.kind, &result).to_json(),
+            json: ResultFile::from_job(output.specification.kind, &result).to_json(),
         };
         (message, SetSamples::new(result.best, result.conclusions))
     })
     .await?;
     reader.send(Part::Result(message)).await?;
-    for rows in left.summary.history.chunks(HISTORY_BLOCK_ROWS) {
+    for rows in output.summary.history.chunks(HISTORY_BLOCK_ROWS) {
         let rows = rows.iter().map(history::evaluation_to_message).collect();
         reader.send(Part::History(HistoryBlock { rows, groups: Vec::new() })).await?;
     }
     send_samples(None, &samples, &reader).await?;
-    for set in 0..left.groups() {
-        let read = reader.kept_waiting(outcomes(&store, job, left.best_of(set))).await?;
+    for set in 0..output.groups() {
+        let read = reader.wait_with_heartbeats(outcomes(&store, job, output.best_of(set))).await?;
         let number = u32::try_from(set).unwrap_or(u32::MAX);
-        let found = computed(&left, &reader, move |left| {
-            let found = left.group(set, read)?;
-            let json = Group::new(left.specification.objective, &found).to_json();
+        let found = compute_on_thread(&output, &reader, move |output| {
+            let found = output.group(set, read)?;
+            let json = Group::new(output.specification.objective, &found).to_json();
             let message = v1::GroupResult { group: number, json };
             Some((message, SetSamples::new(found.best, found.conclusions)))
         });
@@ -123,18 +120,18 @@ pub(crate) async fn send_all(
 /// Runs `compute` on the output of a job, on a thread that may block. The thread cannot be stopped,
 /// so it holds the permit of its fetch until it ends: clients that disconnect and come back cannot
 /// start more of these threads than there are permits.
-async fn computed<T: Send + 'static>(
-    left: &Arc<StoredOutput>,
+async fn compute_on_thread<T: Send + 'static>(
+    output: &Arc<StoredOutput>,
     reader: &FetchStream,
     compute: impl FnOnce(&StoredOutput) -> T + Send + 'static,
 ) -> Result<T, StreamEnd> {
-    let (left, permit) = (Arc::clone(left), Arc::clone(&reader.permit));
+    let (output, permit) = (Arc::clone(output), Arc::clone(&reader.permit));
     let computing = spawn_blocking(move || {
         let _place = permit;
-        compute(&left)
+        compute(&output)
     });
     let failed = |_| Status::internal("the result could not be computed; see the log");
-    reader.kept_waiting(async { computing.await.map_err(failed) }).await
+    reader.wait_with_heartbeats(async { computing.await.map_err(failed) }).await
 }
 
 /// Sends the realizations at the best point of a set of data, then the draws from its posterior.
@@ -155,11 +152,11 @@ async fn send_samples(
     Ok(())
 }
 
-/// The reading end of a fetch.
+/// The stream of a fetch to its reader.
 pub(crate) struct FetchStream {
     parts: mpsc::Sender<Result<FetchResponse, Status>>,
     until: Instant,
-    /// Its concurrency permit.
+    /// Counts as one of the fetches that are allowed at a time.
     permit: Arc<dyn Send + Sync>,
 }
 
@@ -185,13 +182,13 @@ impl FetchStream {
         match timeout(patience, self.parts.send(message)).await {
             Ok(Ok(())) => Ok(()),
             Ok(Err(_)) => Err(StreamEnd::Gone),
-            Err(_) => Err(StreamEnd::Told(too_late())),
+            Err(_) => Err(StreamEnd::Told(too_late_status())),
         }
     }
 
     /// Waits for `work`, until the fetch has taken too long or the reader has gone. Heartbeats are
     /// sent meanwhile, because the reader gives up on a silent coordinator.
-    async fn kept_waiting<T>(
+    async fn wait_with_heartbeats<T>(
         &self,
         work: impl Future<Output = Result<T, Status>>,
     ) -> Result<T, StreamEnd> {
@@ -205,7 +202,7 @@ impl FetchStream {
                 () = sleep(SIGN_OF_LIFE.min(left)) => {}
             }
             if Instant::now() >= self.until {
-                return Err(StreamEnd::Told(too_slow()));
+                return Err(StreamEnd::Told(too_slow_status()));
             }
             let sign = Part::History(HistoryBlock::default());
             // A reader that still has parts to read needs no heartbeat.
@@ -217,7 +214,7 @@ impl FetchStream {
 /// Returns the parts that `produce` sends as a stream. A reader that reads nothing for a while, or
 /// takes too long in all, receives no more parts, so that the output of the job and the permit
 /// `permit` are not held indefinitely.
-pub(crate) fn paced<F>(
+pub(crate) fn stream_paced<F>(
     permit: impl Send + Sync + 'static,
     produce: impl FnOnce(FetchStream) -> F,
 ) -> impl Stream<Item = Result<FetchResponse, Status>> + Send
@@ -229,7 +226,7 @@ where
     let until = Instant::now() + Duration::from_secs(FETCH_SECONDS_MAX);
     let producing = produce(FetchStream { parts, until, permit: Arc::new(permit) });
     tokio::spawn(async move {
-        // The reader's permit is released with it.
+        // The permit is released when this ends.
         let stopped = producing.await;
         if let Err(StreamEnd::Told(status)) = stopped {
             // The reader may have gone by now.
@@ -244,14 +241,14 @@ fn patience() -> Duration {
     Duration::from_secs(READER_STALL_SECONDS_MAX)
 }
 
-fn too_late() -> Status {
+fn too_late_status() -> Status {
     Status::deadline_exceeded(format!(
         "the client read nothing of the results for {READER_STALL_SECONDS_MAX} s, or not all of them \
          within {FETCH_SECONDS_MAX} s; fetch them again"
     ))
 }
 
-fn too_slow() -> Status {
+fn too_slow_status() -> Status {
     Status::deadline_exceeded(format!(
         "the results were not read and computed within {FETCH_SECONDS_MAX} s; fetch them again when the \
          coordinator has less to do"
@@ -278,7 +275,7 @@ mod tests {
         count: usize,
         permit: OwnedSemaphorePermit,
     ) -> impl Stream<Item = Result<FetchResponse, Status>> + Send {
-        paced(permit, move |reader| async move {
+        stream_paced(permit, move |reader| async move {
             for _ in 0..count {
                 reader.send(Part::History(HistoryBlock::default())).await?;
             }
@@ -359,7 +356,7 @@ mod tests {
                 assert!(answered, "nobody waits any more");
             }
         });
-        let mut stream = Box::pin(paced((), |reader| send_all(weak, (end, None), reader)));
+        let mut stream = Box::pin(stream_paced((), |reader| send_all(weak, (end, None), reader)));
         let (mut parts, mut signs) = (Vec::new(), 0);
         while let Some(part) = timeout(2 * SIGN_OF_LIFE, stream.next()).await.unwrap() {
             let part = part.unwrap().part.unwrap();
@@ -385,7 +382,8 @@ mod tests {
         let (store, _commands) = mpsc::channel(1);
         let semaphore = Arc::new(Semaphore::new(1));
         let permit = permit(&semaphore).await;
-        let stream = paced(permit, |reader| send_all(store.downgrade(), (end, None), reader));
+        let stream =
+            stream_paced(permit, |reader| send_all(store.downgrade(), (end, None), reader));
         let limit = Duration::from_secs(FETCH_SECONDS_MAX) + patience();
         let parts: Vec<_> = timeout(limit, stream.collect()).await.unwrap();
         let last = parts.last().unwrap().as_ref().unwrap_err();
@@ -404,7 +402,10 @@ mod tests {
         };
         let samples = SetSamples { outcomes: vec![Ok(3900.0)], draws: vec![draw; DRAW_BLOCK + 1] };
         let stream =
-            paced((), |reader| async move { send_samples(Some(3), &samples, &reader).await });
+            stream_paced(
+                (),
+                |reader| async move { send_samples(Some(3), &samples, &reader).await },
+            );
         let parts: Vec<_> = stream.map(|part| part.unwrap().part.unwrap()).collect().await;
         let [Part::Realizations(_), Part::Draws(first), Part::Draws(last)] = parts.as_slice()
         else {
@@ -437,8 +438,8 @@ mod tests {
         let semaphore = Arc::new(Semaphore::new(1));
         let (release, released) = blocking::channel();
         let permit = permit(&semaphore).await;
-        let mut stream = Box::pin(paced(permit, |reader| async move {
-            computed(&left, &reader, move |_| released.recv().unwrap()).await
+        let mut stream = Box::pin(stream_paced(permit, |reader| async move {
+            compute_on_thread(&left, &reader, move |_| released.recv().unwrap()).await
         }));
         for _ in 0..10 {
             let part = next(&mut stream).await.unwrap().unwrap().part.unwrap();

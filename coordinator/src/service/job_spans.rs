@@ -76,7 +76,7 @@ impl JobSpans {
     }
 
     /// Notes the context of a client that submits a job.
-    pub(crate) fn submitted(
+    pub(crate) fn note_submission(
         &mut self,
         reply_id: ReplyId,
         client: Option<TraceContext>,
@@ -86,7 +86,7 @@ impl JobSpans {
     }
 
     /// Sees an event before the reaction to it.
-    pub(crate) fn before(&mut self, event: &Event, now: Duration) {
+    pub(crate) fn observe_event(&mut self, event: &Event, now: Duration) {
         self.touched.clear();
         if let Event::Answered { worker, batch, .. } = event
             && self.batches.get(batch).is_some_and(|held| held.worker == *worker)
@@ -96,20 +96,20 @@ impl JobSpans {
     }
 
     /// Sees the effects of the reaction, and the state after it.
-    pub(crate) fn after(&mut self, state: &State, effects: &[Effect], now: Duration) {
+    pub(crate) fn observe_reaction(&mut self, state: &State, effects: &[Effect], now: Duration) {
         for effect in effects {
             if let Effect::Answer { reply_id, answer } = effect {
-                self.answered(state, *reply_id, answer);
+                self.observe_answer(state, *reply_id, answer);
             }
         }
         for effect in effects {
             match effect {
                 Effect::Send { worker, batch, work } => {
-                    self.sent(state, *worker, *batch, work, now);
+                    self.begin_batch(state, *worker, *batch, work, now);
                 }
                 Effect::Revoke { batch, .. } => self.end_batch(*batch, Some("revoked"), now),
                 Effect::Note(Notice::WorkerDetached { worker, .. }) => {
-                    self.departed(*worker, now);
+                    self.end_batches_of(*worker, now);
                 }
                 Effect::Note(Notice::JobEnded { job, ending, .. }) => {
                     self.end_job(*job, ending.status.name(), ending.reason.clone(), now);
@@ -130,7 +130,7 @@ impl JobSpans {
         Some(self.batches.get(&batch)?.span.as_ref()?.context())
     }
 
-    fn answered(&mut self, state: &State, reply_id: ReplyId, answer: &Answer) {
+    fn observe_answer(&mut self, state: &State, reply_id: ReplyId, answer: &Answer) {
         let Some((begun, client)) = self.submissions.remove(&reply_id) else {
             return;
         };
@@ -141,7 +141,14 @@ impl JobSpans {
         }
     }
 
-    fn sent(&mut self, state: &State, worker: WorkerId, id: BatchId, work: &Work, now: Duration) {
+    fn begin_batch(
+        &mut self,
+        state: &State,
+        worker: WorkerId,
+        id: BatchId,
+        work: &Work,
+        now: Duration,
+    ) {
         let Some(batch) = state.batches.get(&id) else {
             return;
         };
@@ -165,7 +172,7 @@ impl JobSpans {
         self.batches.insert(id, BatchSpan { worker, attempt, span });
     }
 
-    fn departed(&mut self, worker: WorkerId, now: Duration) {
+    fn end_batches_of(&mut self, worker: WorkerId, now: Duration) {
         let held = self.batches.iter().filter(|(_, batch)| batch.worker == worker);
         for batch in Vec::from_iter(held.map(|(id, _)| *id)) {
             self.end_batch(batch, Some("the worker departed"), now);

@@ -35,6 +35,7 @@ use crate::access::limiter::{Caller, Limiter};
 use crate::core::event::{self, Retention};
 use crate::core::ids::{JobId, WorkerId};
 use crate::service::fetching;
+use crate::service::no_answer::{stopped_status, unexpected_status};
 use crate::service::observers;
 use crate::store::thread::StoreCommand;
 use crate::store::{BanRecord, EndRecord};
@@ -71,7 +72,7 @@ impl JobsService {
     /// Queues a message for the core task; refused when the task does not keep up.
     async fn send(&self, message: Message) -> Result<(), Status> {
         self.messages.send_timeout(message, QUEUE_PATIENCE).await.map_err(|error| match error {
-            SendTimeoutError::Closed(_) => stopped(),
+            SendTimeoutError::Closed(_) => stopped_status(),
             SendTimeoutError::Timeout(_) => status::resource_exhausted(
                 "the coordinator has more requests than it can answer; try again",
                 RETRY,
@@ -83,14 +84,14 @@ impl JobsService {
     pub(crate) async fn ask(&self, request: event::Request) -> Result<Answer, Status> {
         let (reply, answer) = oneshot::channel();
         self.send(Message::Ask(request, reply)).await?;
-        answered(answer).await
+        wait_for_answer(answer).await
     }
 
     /// Returns what an operator should know, as sentences.
     pub(crate) async fn concerns(&self) -> Result<Vec<String>, Status> {
         match self.ask(event::Request::Concerns).await? {
             Answer::Concerns(concerns) => Ok(concerns),
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
@@ -101,19 +102,19 @@ impl JobsService {
     ) -> Result<Answer, Status> {
         let (reply, answer) = oneshot::channel();
         self.send(Message::Submit(request, client, reply)).await?;
-        answered(answer).await
+        wait_for_answer(answer).await
     }
 
     async fn snapshot(&self, request: event::Request) -> Result<Option<JobSnapshot>, Status> {
         match self.ask(request).await? {
             Answer::Snapshot(snapshot) => Ok(Some(snapshot)),
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
     /// Returns the status that names what a cancelled job waits for, before its client has waited
     /// too long.
-    async fn not_ended_yet(&self, job: JobId) -> Result<Status, Status> {
+    async fn still_ending_status(&self, job: JobId) -> Result<Status, Status> {
         let snapshot = self.snapshot(event::Request::Get(job)).await?;
         let waiting_for = snapshot.unwrap_or_default().waiting_for;
         let waits = if waiting_for.is_empty() { String::new() } else { format!(": {waiting_for}") };
@@ -124,7 +125,7 @@ impl JobsService {
     async fn end(&self, job: JobId) -> Result<(EndRecord, Option<Integrity>), Status> {
         match self.ask(event::Request::Fetch(job)).await? {
             Answer::Ended { end, integrity } => Ok((end, integrity)),
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 }
@@ -148,7 +149,7 @@ impl Jobs for JobsService {
         let client = holder.unwrap_or(client);
         for (field, value) in [("request_id", &request_id), ("client", &client), ("name", &name)] {
             if value.len() > NAME_BYTES_MAX {
-                return Err(too_long(field, value));
+                return Err(too_long_status(field, value));
             }
         }
         if name.chars().any(char::is_control) {
@@ -166,7 +167,7 @@ impl Jobs for JobsService {
         let submit = event::Request::Submit { specification, request_id, client, priority, name };
         match self.submit_traced(submit, client_span).await? {
             Answer::Submitted(job) => Ok(Response::new(SubmitResponse { job: job.to_string() })),
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
@@ -183,7 +184,7 @@ impl Jobs for JobsService {
         let job = job(&request.into_inner().job)?;
         match self.ask(event::Request::Explain(job)).await? {
             Answer::Explained(explained) => Ok(Response::new(explained)),
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
@@ -206,7 +207,7 @@ impl Jobs for JobsService {
                 next_page_token: more_after.map(|job| job.to_string()).unwrap_or_default(),
                 concerns,
             })),
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
@@ -218,7 +219,8 @@ impl Jobs for JobsService {
         let job = job(&text)?;
         let (reply, answer) = oneshot::channel();
         self.send(Message::Watch(job, reply)).await?;
-        let snapshots = answer.await.map_err(|_| stopped())?.map_err(|error| refused(&error))?;
+        let snapshots =
+            answer.await.map_err(|_| stopped_status())?.map_err(|error| refusal_status(&error))?;
         Ok(Response::new(Box::pin(observers::follow(snapshots, after))))
     }
 
@@ -232,7 +234,7 @@ impl Jobs for JobsService {
         let cancelled = self.snapshot(event::Request::Cancel(job));
         let snapshot = match timeout(END_PATIENCE, cancelled).await {
             Ok(snapshot) => snapshot?,
-            Err(_) => return Err(self.not_ended_yet(job).await?),
+            Err(_) => return Err(self.still_ending_status(job).await?),
         };
         Ok(Response::new(CancelResponse { snapshot }))
     }
@@ -246,7 +248,8 @@ impl Jobs for JobsService {
         let permit = self.fetches.acquire(caller).await?;
         let ended = self.end(job).await?;
         let store = self.store.downgrade();
-        let sent = fetching::paced(permit, |reader| fetching::send_all(store, ended, reader));
+        let sent =
+            fetching::stream_paced(permit, |reader| fetching::send_all(store, ended, reader));
         Ok(Response::new(Box::pin(sent)))
     }
 
@@ -264,7 +267,7 @@ impl Jobs for JobsService {
                 let jobs = jobs.iter().map(JobId::to_string).collect();
                 Ok(Response::new(PruneResponse { jobs }))
             }
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
@@ -279,8 +282,8 @@ impl Jobs for JobsService {
             )
         })?;
         let (reply, copied) = oneshot::channel();
-        self.store.send(StoreCommand::Copy { reply }).await.map_err(|_| stopped())?;
-        Ok(Response::new(Box::pin(backing_up::streamed(copied, place))))
+        self.store.send(StoreCommand::Copy { reply }).await.map_err(|_| stopped_status())?;
+        Ok(Response::new(Box::pin(backing_up::stream_copy(copied, place))))
     }
 
     async fn list_workers(
@@ -289,7 +292,7 @@ impl Jobs for JobsService {
     ) -> Result<Response<ListWorkersResponse>, Status> {
         match self.ask(event::Request::Workers).await? {
             Answer::Workers(workers) => Ok(Response::new(workers)),
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
@@ -302,7 +305,7 @@ impl Jobs for JobsService {
             Answer::Worker(worker) => {
                 Ok(Response::new(DrainWorkerResponse { worker: Some(worker) }))
             }
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
@@ -312,14 +315,14 @@ impl Jobs for JobsService {
     ) -> Result<Response<LiftBanResponse>, Status> {
         let host = request.into_inner().host;
         if host.len() > NAME_BYTES_MAX {
-            return Err(too_long("host", &host));
+            return Err(too_long_status("host", &host));
         }
         match self.ask(event::Request::Unban(host)).await? {
             Answer::Unbanned(record) => {
                 let worker = Some(banned_worker(record, Duration::ZERO));
                 Ok(Response::new(LiftBanResponse { worker }))
             }
-            _ => Err(unexpected()),
+            _ => Err(unexpected_status()),
         }
     }
 
@@ -337,7 +340,7 @@ impl Jobs for JobsService {
         _: Request<ListBansRequest>,
     ) -> Result<Response<ListBansResponse>, Status> {
         let Answer::Banned(banned) = self.ask(event::Request::Banned).await? else {
-            return Err(unexpected());
+            return Err(unexpected_status());
         };
         let workers = banned.into_iter().map(|(record, elapsed)| banned_worker(record, elapsed));
         Ok(Response::new(ListBansResponse { workers: workers.collect() }))
@@ -354,27 +357,27 @@ fn banned_worker(record: BanRecord, elapsed: Duration) -> BannedWorker {
     }
 }
 
-async fn answered(answer: oneshot::Receiver<Answer>) -> Result<Answer, Status> {
-    match answer.await.map_err(|_| stopped())? {
-        Answer::Refused(refusal) => Err(refused(&refusal)),
+async fn wait_for_answer(answer: oneshot::Receiver<Answer>) -> Result<Answer, Status> {
+    match answer.await.map_err(|_| stopped_status())? {
+        Answer::Refused(refusal) => Err(refusal_status(&refusal)),
         answer => Ok(answer),
     }
 }
 
 fn job(text: &str) -> Result<JobId, Status> {
     if text.len() > NAME_BYTES_MAX {
-        return Err(too_long("job", text));
+        return Err(too_long_status("job", text));
     }
     JobId::parse(text)
         .ok_or_else(|| status::not_found(Resource::Job, text, format!("no such job: `{text}`")))
 }
 
-fn too_long(field: &str, value: &str) -> Status {
+fn too_long_status(field: &str, value: &str) -> Status {
     let message = format!("has {} bytes; at most {NAME_BYTES_MAX} are allowed", value.len());
     status::bad_field(field, &message)
 }
 
-fn refused(refusal: &Refusal) -> Status {
+fn refusal_status(refusal: &Refusal) -> Status {
     let message = refusal.to_string();
     match refusal {
         Refusal::NoJob { job } => status::not_found(Resource::Job, job.to_string(), message),
@@ -392,14 +395,6 @@ fn refused(refusal: &Refusal) -> Status {
         | Refusal::NotPruned { .. }
         | Refusal::NotReopened { .. } => Status::unavailable(message),
     }
-}
-
-fn stopped() -> Status {
-    Status::unavailable("the coordinator has stopped; try again when it is back")
-}
-
-fn unexpected() -> Status {
-    Status::internal("the coordinator gave an answer of another type than requested")
 }
 
 #[cfg(test)]
@@ -431,7 +426,7 @@ mod tests {
             (Refusal::Store { error: error.clone() }, Code::Unavailable, None),
             (Refusal::NotPruned { error }, Code::Unavailable, None),
         ] {
-            let status = refused(&refusal);
+            let status = refusal_status(&refusal);
             assert_eq!((status.code(), status::retry_after(&status)), (code, retry), "{refusal}");
             assert_eq!(status.message(), refusal.to_string());
         }

@@ -149,8 +149,8 @@ impl Listener {
             Some(host) if local.ip().is_unspecified() => format!("https://{host}:{}", local.port()),
             _ => format!("https://{local}"),
         };
-        let (bound, policy) = (BoundSocket::Tcp(listener), Policy::Tls(tokens));
-        Ok(Self { bound, file: None, tls: Some(tls), policy, beside: Vec::new(), spans: None, url })
+        let open = Self::for_everybody(BoundSocket::Tcp(listener), None, url);
+        Ok(Self { tls: Some(tls), policy: Policy::Tls(tokens), ..open })
     }
 
     /// Admits only holders of tokens.
@@ -191,7 +191,7 @@ impl Listener {
         let refused = |source| BindError::Tcp { address, source };
         let listener = TcpListener::bind(address).await.map_err(refused)?;
         let url = url(listener.local_addr().map_err(refused)?).await;
-        Ok(Self::open(BoundSocket::Tcp(listener), None, url))
+        Ok(Self::for_everybody(BoundSocket::Tcp(listener), None, url))
     }
 
     async fn bind_unix(path: &Path) -> Result<Self, BindError> {
@@ -206,11 +206,11 @@ impl Listener {
         let identity = identity(path).map_err(refused)?;
         let file = SocketFile { path: path.to_owned(), identity };
         let url = format!("unix:{}", path.display());
-        Ok(Self::open(BoundSocket::Unix(listener), Some(file), url))
+        Ok(Self::for_everybody(BoundSocket::Unix(listener), Some(file), url))
     }
 
     /// Returns a listener that admits everybody.
-    fn open(bound: BoundSocket, file: Option<SocketFile>, url: String) -> Self {
+    fn for_everybody(bound: BoundSocket, file: Option<SocketFile>, url: String) -> Self {
         Self {
             bound,
             file,

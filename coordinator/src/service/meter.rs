@@ -17,7 +17,7 @@ pub(crate) struct Meter {
     event_times: TimeDistribution,
 }
 
-/// The begin of a reaction.
+/// The beginning of a reaction.
 #[derive(Debug)]
 pub(crate) struct Reading {
     begun: Instant,
@@ -37,18 +37,18 @@ pub(crate) struct CoreReport {
 impl Meter {
     /// Counts an event to which the state is about to react.
     pub(crate) fn begin(&mut self, state: &State, event: &Event, now: Duration) -> Reading {
-        Reading { begun: Instant::now(), before: self.tally.before(state, event, now) }
+        Reading { begun: Instant::now(), before: self.tally.count_event(state, event, now) }
     }
 
-    /// EventCounts the effects of the reaction.
-    pub(crate) fn reacted(
+    /// Counts the effects of the reaction.
+    pub(crate) fn count_reaction(
         &mut self,
         reading: &Reading,
         state: &State,
         effects: &[Effect],
         now: Duration,
     ) {
-        self.tally.after(&reading.before, state, effects, now);
+        self.tally.count_reaction(&reading.before, state, effects, now);
     }
 
     /// Measures a reaction whose effects are carried out.
@@ -56,9 +56,9 @@ impl Meter {
         self.event_times.add(reading.begun.elapsed());
     }
 
-    /// EventCounts the effects of the coordinator's start.
-    pub(crate) fn started(&mut self, state: &State, effects: &[Effect], now: Duration) {
-        self.tally.effects(state, effects, now);
+    /// Counts the effects of the coordinator's start.
+    pub(crate) fn count_start(&mut self, state: &State, effects: &[Effect], now: Duration) {
+        self.tally.count_effects(state, effects, now);
     }
 
     /// Returns counts and measurements as of `now`.

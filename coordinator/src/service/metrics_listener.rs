@@ -139,26 +139,30 @@ async fn serve(listener: MetricsListener, sources: MetricSources) {
 async fn answer(State(sources): State<Arc<MetricSources>>, method: Method, uri: Uri) -> Response {
     match uri.path() {
         METRICS_PATH if ![Method::GET, Method::HEAD].contains(&method) => {
-            let mut refused = plain(StatusCode::METHOD_NOT_ALLOWED, "only GET and HEAD\n");
+            let mut refused = plain_response(StatusCode::METHOD_NOT_ALLOWED, "only GET and HEAD\n");
             refused.headers_mut().insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
             refused
         }
         METRICS_PATH => match sources.text().await {
-            Some(text) => typed(StatusCode::OK, exposition::CONTENT_TYPE, text),
-            None => plain(
+            Some(text) => typed_response(StatusCode::OK, exposition::CONTENT_TYPE, text),
+            None => plain_response(
                 StatusCode::SERVICE_UNAVAILABLE,
                 "the coordinator does not answer; its log may say why\n",
             ),
         },
-        _ => plain(StatusCode::NOT_FOUND, "the metrics are at /metrics\n"),
+        _ => plain_response(StatusCode::NOT_FOUND, "the metrics are at /metrics\n"),
     }
 }
 
-fn plain(status: StatusCode, text: &'static str) -> Response {
-    typed(status, "text/plain; charset=utf-8", text)
+fn plain_response(status: StatusCode, text: &'static str) -> Response {
+    typed_response(status, "text/plain; charset=utf-8", text)
 }
 
-fn typed(status: StatusCode, content_type: &'static str, text: impl Into<Body>) -> Response {
+fn typed_response(
+    status: StatusCode,
+    content_type: &'static str,
+    text: impl Into<Body>,
+) -> Response {
     let mut response = Response::new(text.into());
     *response.status_mut() = status;
     let content_type = HeaderValue::from_static(content_type);

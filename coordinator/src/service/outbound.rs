@@ -130,7 +130,6 @@ pub(crate) fn drain() -> AttachResponse {
     respond(Response::Drain(WorkerDrain {}))
 }
 
-/// Returns a heartbeat.
 pub(crate) fn heartbeat() -> AttachResponse {
     respond(Response::Heartbeat(Heartbeat {}))
 }
@@ -192,7 +191,7 @@ mod tests {
 
     /// Sends batches of these evaluations on a new stream to a worker that reads each at once;
     /// returns the evaluations that came, in their order.
-    fn announced(ids: impl IntoIterator<Item = u64>) -> Vec<u64> {
+    fn announce_batches(ids: impl IntoIterator<Item = u64>) -> Vec<u64> {
         let (sender, mut stream) = mpsc::channel(2);
         let (mut outbound, _closed) = Outbound::new(sender);
         let (mut received, mut announced) = (Received::default(), Vec::new());
@@ -228,14 +227,14 @@ mod tests {
     #[test]
     fn an_evaluation_is_sent_before_its_first_batch_and_again_when_the_worker_has_lost_it() {
         for _stream in 0..2 {
-            assert_eq!(announced([5, 5, 6, 5, 6]), [5, 6]);
+            assert_eq!(announce_batches([5, 5, 6, 5, 6]), [5, 6]);
         }
         let most = EVALUATIONS_KEPT_MAX as u64;
         let all = || 0..most;
-        assert_eq!(announced(all().chain(all())), all().collect::<Vec<_>>());
+        assert_eq!(announce_batches(all().chain(all())), all().collect::<Vec<_>>());
         let one_more = || all().chain([most]);
         let twice: Vec<u64> = one_more().chain([0, 1]).collect();
-        assert_eq!(announced(one_more().chain([most, 0, 1, most])), twice);
+        assert_eq!(announce_batches(one_more().chain([most, 0, 1, most])), twice);
     }
 
     #[test]

@@ -111,9 +111,9 @@ pub async fn start(
     let config = Config { audit_key, ..config };
     let clock = Clock::new();
     tracing::info!(
-        unfinished_jobs = restored.unfinished(),
-        ended_jobs = restored.ended(),
-        banned_workers = restored.banned(),
+        unfinished_jobs = restored.unfinished_jobs(),
+        ended_jobs = restored.ended_jobs(),
+        banned_workers = restored.banned_workers(),
         "jobs recovered from the store"
     );
     let (state, effects) = State::restore(config, restored, clock.now());
@@ -144,15 +144,15 @@ pub async fn start(
     let router = services(&messages, &commands, decided, config).await?;
     let url = listener.url().to_owned();
     let (stop_serving, stopped) = oneshot::channel();
-    let places = Places::of_coordinator();
+    let places = Places::for_coordinator();
     let server = serve(router, listener, shown, places.clone(), stopped);
-    let server = tokio::spawn(guarded(failing.guard(ComponentFailure::Server), server));
+    let server = tokio::spawn(run_guarded(failing.guard(ComponentFailure::Server), server));
     let guard = failing.guard(ComponentFailure::Core);
     let meter = (!beside.is_empty()).then(Meter::default);
     let monitoring = Monitoring { meter, spans: listener_spans.map(JobSpans::new) };
     let core = Core::new(state, clock, commands, events, places, failing.clone(), monitoring);
     let core = core.run(effects, inbox, from_store, config.tick);
-    let core = tokio::spawn(guarded(guard, core));
+    let core = tokio::spawn(run_guarded(guard, core));
     tracing::info!(%url, "listening");
     Ok(Coordinator {
         url,
@@ -257,7 +257,7 @@ impl Coordinator {
     }
 }
 
-async fn guarded(guard: Guard, part: impl Future<Output = ()>) {
+async fn run_guarded(guard: Guard, part: impl Future<Output = ()>) {
     part.await;
     drop(guard);
 }
@@ -274,15 +274,15 @@ async fn services(
     let (health, health_service) = tonic_health::server::health_reporter();
     health.set_serving::<JobsServer<JobsService>>().await;
     health.set_serving::<WorkersServer<WorkersService>>().await;
-    let described = || {
+    let describe = || {
         tonic_reflection::server::Builder::configure()
             .register_encoded_file_descriptor_set(v1::FILE_DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
     let unreadable = |source| StartError::Reflection { source };
-    let reflection = described().build_v1().map_err(unreadable)?;
+    let reflection = describe().build_v1().map_err(unreadable)?;
     // The official clients of some languages support only this version.
-    let reflection_v1alpha = described().build_v1alpha().map_err(unreadable)?;
+    let reflection_v1alpha = describe().build_v1alpha().map_err(unreadable)?;
     Ok(Server::builder()
         .http2_keepalive_interval(Some(KEEPALIVE))
         .http2_keepalive_timeout(Some(KEEPALIVE))

@@ -146,7 +146,7 @@ mod tests {
     use crate::service::outbound::{heartbeat, status};
 
     /// Returns a worker that sends a hello message, then neither sends nor reads.
-    async fn attached() -> (Outbound, mpsc::Receiver<Message>, ReceiverStream<Outgoing>) {
+    async fn silent_worker() -> (Outbound, mpsc::Receiver<Message>, ReceiverStream<Outgoing>) {
         let hello = AttachRequest { message: Some(Request::Hello(WorkerHello::default())) };
         let incoming = futures::stream::iter([Ok(hello)]).chain(futures::stream::pending());
         let (sender, mut messages) = mpsc::channel(4);
@@ -167,7 +167,7 @@ mod tests {
 
     #[tokio::test]
     async fn the_stream_of_a_worker_that_does_not_read_ends_when_it_is_closed() {
-        let (outbound, messages, stream) = attached().await;
+        let (outbound, messages, stream) = silent_worker().await;
         for _ in 0..OUTBOUND_MAX {
             outbound.send(Ok(heartbeat())).unwrap();
         }
@@ -181,7 +181,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_worker_that_reads_learns_why_its_stream_ends() {
-        let (outbound, messages, mut stream) = attached().await;
+        let (outbound, messages, mut stream) = silent_worker().await;
         outbound.send(Err(status(&CloseReason::Draining))).unwrap();
         drop(outbound);
         assert_eq!(stream.next().await.unwrap().unwrap_err().code(), Code::Unavailable);
@@ -192,7 +192,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_worker_that_goes_is_noticed() {
-        let (_outbound, messages, stream) = attached().await;
+        let (_outbound, messages, stream) = silent_worker().await;
         drop(stream);
         check_ended(messages).await;
     }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::scale::Tick;
 use super::{Axis, AxisScale, Chart, ChartLayer, Ink, Shape};
-use crate::text::{escaped, shortened};
+use crate::text::{escape, shorten};
 
 /// Colours and strokes of charts, for a page that contains them and for files of their own.
 pub(crate) const STYLE: &str = include_str!("chart.css");
@@ -53,23 +53,23 @@ impl Frame {
         // A logarithm of 0 lies far below.
         let y = if y == f64::INFINITY { 2.0 * self.height } else { y };
         let near = |value: f64| value.is_finite() && value.abs() < 1e5;
-        (near(x) && near(y)).then(|| format!("{},{}", short(x), short(y)))
+        (near(x) && near(y)).then(|| format!("{},{}", coordinate(x), coordinate(y)))
     }
 }
 
 impl Chart {
     /// Returns the chart as an element of a page; its colours come from [`STYLE`].
     pub(crate) fn svg(&self) -> String {
-        self.drawn("")
+        self.draw("")
     }
 
     /// Returns the chart as a file of its own.
     pub(crate) fn svg_file(&self) -> String {
         let style = format!("<style>{STYLE}</style>");
-        format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}\n", self.drawn(&style))
+        format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}\n", self.draw(&style))
     }
 
-    fn drawn(&self, style: &str) -> String {
+    fn draw(&self, style: &str) -> String {
         let legend = legend(&self.layers);
         let frame = self.frame(legend.len());
         let height = frame.top + frame.height + 2.6 * LINE;
@@ -79,10 +79,10 @@ impl Chart {
              role=\"img\" aria-labelledby=\"t-{name} d-{name}\" {}>\
              <title id=\"t-{name}\">{}</title><desc id=\"d-{name}\">{}</desc>{style}\
              <rect class=\"paper\" width=\"100%\" height=\"100%\"/>",
-            short(height),
+            coordinate(height),
             plot_data(&frame),
-            escaped(title),
-            escaped(description),
+            escape(title),
+            escape(description),
         );
         text(&mut out, "label", 2.0, LINE - 4.0, &self.y.label);
         for (row, entries) in legend.iter().enumerate() {
@@ -91,7 +91,7 @@ impl Chart {
         self.axes(&mut out, &frame);
         // An inner element, because it cuts what lies outside of the plot.
         let [left, top, width, height] =
-            [frame.left, frame.top, frame.width, frame.height].map(short);
+            [frame.left, frame.top, frame.width, frame.height].map(coordinate);
         let _infallible = write!(
             out,
             "<svg class=\"plot\" x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\">"
@@ -105,10 +105,10 @@ impl Chart {
 
     fn frame(&self, legend_rows: usize) -> Frame {
         let [x, y] = self.scales();
-        let labels = labels_of(&self.y, &y, 5);
+        let labels = axis_ticks(&self.y, &y, 5);
         let widest = labels.iter().map(|tick| tick.label.chars().count()).max().unwrap_or(0);
         let left = (widest as f64 * CHARACTER + 12.0).max(26.0);
-        let last = labels_of(&self.x, &x, 5).last().map_or(0, |tick| tick.label.chars().count());
+        let last = axis_ticks(&self.x, &x, 5).last().map_or(0, |tick| tick.label.chars().count());
         let right = (last as f64 * CHARACTER / 2.0 + 4.0).max(14.0);
         let top = LINE * (legend_rows as f64 + 1.0) + 6.0;
         let (width, mut height) = (WIDTH - left - right, PLOT_HEIGHT * self.height);
@@ -142,18 +142,21 @@ impl Chart {
     fn axes(&self, out: &mut String, frame: &Frame) {
         let (bottom, right) = (frame.top + frame.height, frame.left + frame.width);
         let mut grid = String::new();
-        for tick in labels_of(&self.x, &frame.x, 5) {
+        for tick in axis_ticks(&self.x, &frame.x, 5) {
             let x = frame.left + frame.x(tick.value);
-            let _infallible = write!(grid, "M{} {}V{}", short(x), short(frame.top), short(bottom));
+            let _infallible =
+                write!(grid, "M{} {}V{}", coordinate(x), coordinate(frame.top), coordinate(bottom));
             text(out, "tick middle", x, bottom + LINE - 2.0, &tick.label);
         }
-        for tick in labels_of(&self.y, &frame.y, 5) {
+        for tick in axis_ticks(&self.y, &frame.y, 5) {
             let y = frame.top + frame.y(tick.value);
-            let _infallible = write!(grid, "M{} {}H{}", short(frame.left), short(y), short(right));
+            let _infallible =
+                write!(grid, "M{} {}H{}", coordinate(frame.left), coordinate(y), coordinate(right));
             text(out, "tick end", frame.left - 6.0, y + 4.0, &tick.label);
         }
         let _infallible = write!(out, "<path class=\"grid\" d=\"{grid}\"/>");
-        let [left, top, right, bottom_text] = [frame.left, frame.top, right, bottom].map(short);
+        let [left, top, right, bottom_text] =
+            [frame.left, frame.top, right, bottom].map(coordinate);
         let _infallible =
             write!(out, "<path class=\"axis\" d=\"M{left} {top}V{bottom_text}H{right}\"/>");
         let center = frame.left + frame.width / 2.0;
@@ -162,28 +165,29 @@ impl Chart {
 }
 
 /// Returns the marks of an axis.
-fn labels_of(axis: &Axis, scale: &AxisScale, count: usize) -> Vec<Tick> {
+fn axis_ticks(axis: &Axis, scale: &AxisScale, count: usize) -> Vec<Tick> {
     if axis.categories.is_empty() {
         return scale.ticks(count);
     }
     let name = |(place, name): (usize, &String)| Tick {
         value: place as f64,
-        label: shortened(name, CATEGORY_CHARACTERS),
+        label: shorten(name, CATEGORY_CHARACTERS),
     };
     axis.categories.iter().enumerate().map(name).collect()
 }
 
 /// Returns where the plot lies and what it spans, for a script that shows values under the pointer.
 fn plot_data(frame: &Frame) -> String {
-    let [left, top, width, height] = [frame.left, frame.top, frame.width, frame.height].map(short);
-    let of = |scale: &AxisScale| {
+    let [left, top, width, height] =
+        [frame.left, frame.top, frame.width, frame.height].map(coordinate);
+    let describe_scale = |scale: &AxisScale| {
         let spacing = match scale.spacing {
             super::Spacing::Linear => "linear",
             super::Spacing::Logarithmic => "log",
         };
         format!("{spacing} {:e} {:e}", scale.low, scale.high)
     };
-    let (x, y) = (of(&frame.x), of(&frame.y));
+    let (x, y) = (describe_scale(&frame.x), describe_scale(&frame.y));
     format!("data-plot=\"{left} {top} {width} {height}\" data-x=\"{x}\" data-y=\"{y}\"")
 }
 
@@ -208,10 +212,10 @@ fn legend(layers: &[ChartLayer]) -> Vec<Vec<(f64, &ChartLayer)>> {
 fn legend_row(out: &mut String, entries: &[(f64, &ChartLayer)], y: f64) {
     for (x, layer) in entries {
         let (class, middle) = (class(layer.ink), y - 4.0);
-        let [from, to, at] = [*x, *x + 22.0, middle].map(short);
+        let [from, to, at] = [*x, *x + 22.0, middle].map(coordinate);
         let _infallible = match layer.shape {
             Shape::Band(_) | Shape::Bars(_) | Shape::Rectangles(_) => {
-                let (kind, top) = (area_class(&layer.shape), short(middle - 5.0));
+                let (kind, top) = (area_class(&layer.shape), coordinate(middle - 5.0));
                 write!(
                     out,
                     "<rect class=\"{kind} {class}\" x=\"{from}\" y=\"{top}\" width=\"22\" \
@@ -232,7 +236,7 @@ fn draw(out: &mut String, layer: &ChartLayer, frame: &Frame) {
     let class = class(layer.ink);
     let _infallible = match &layer.shape {
         Shape::Line(points) => {
-            let name = escaped(&layer.name);
+            let name = escape(&layer.name);
             for piece in pieces(points, frame) {
                 let _infallible = write!(
                     out,
@@ -272,17 +276,17 @@ fn draw(out: &mut String, layer: &ChartLayer, frame: &Frame) {
             for &[low, high, y] in intervals {
                 let [from, to, y, a, b] =
                     [frame.x(low), frame.x(high), frame.y(y), frame.y(y) - 4.0, frame.y(y) + 4.0]
-                        .map(short);
+                        .map(coordinate);
                 let _infallible = write!(path, "M{from} {y}H{to}M{from} {a}V{b}M{to} {a}V{b}");
             }
             write!(out, "<path class=\"interval {class}\" d=\"{path}\"/>")
         }
         Shape::Level(y) => {
-            let (y, right) = (short(frame.y(*y)), short(frame.width));
+            let (y, right) = (coordinate(frame.y(*y)), coordinate(frame.width));
             write!(out, "<path class=\"line {class}\" d=\"M0 {y}H{right}\"/>")
         }
         Shape::Upright(x) => {
-            let (x, bottom) = (short(frame.x(*x)), short(frame.height));
+            let (x, bottom) = (coordinate(frame.x(*x)), coordinate(frame.height));
             write!(out, "<path class=\"line {class}\" d=\"M{x} 0V{bottom}\"/>")
         }
         Shape::Texts(texts) => {
@@ -298,7 +302,7 @@ fn rectangles(out: &mut String, class: &str, all: &[[f64; 4]], frame: &Frame) ->
     let mut path = String::new();
     for &[from, to, bottom, top] in all {
         let [from, to, bottom, top] =
-            [frame.x(from), frame.x(to), frame.y(bottom), frame.y(top)].map(short);
+            [frame.x(from), frame.x(to), frame.y(bottom), frame.y(top)].map(coordinate);
         write!(path, "M{from} {bottom}V{top}H{to}V{bottom}z")?;
     }
     write!(out, "<path class=\"{class}\" d=\"{path}\"/>")
@@ -308,14 +312,14 @@ fn rectangles(out: &mut String, class: &str, all: &[[f64; 4]], frame: &Frame) ->
 fn pieces(points: &[[f64; 2]], frame: &Frame) -> Vec<String> {
     let placed: Vec<Option<String>> = points.iter().map(|&[x, y]| frame.point(x, y)).collect();
     let parts = placed.split(Option::is_none);
-    let joined = |part: &[Option<String>]| part.iter().flatten().cloned().collect::<Vec<_>>();
-    parts.map(joined).filter(|part| !part.is_empty()).map(|part| part.join(" ")).collect()
+    let join = |part: &[Option<String>]| part.iter().flatten().cloned().collect::<Vec<_>>();
+    parts.map(join).filter(|part| !part.is_empty()).map(|part| part.join(" ")).collect()
 }
 
 /// Draws a point: each colour has a form of its own.
 fn marker(out: &mut String, ink: Ink, x: f64, y: f64) {
     let class = class(ink);
-    let [x, y, left, right, up, down] = [x, y, x - 4.0, x + 4.0, y - 4.0, y + 4.0].map(short);
+    let [x, y, left, right, up, down] = [x, y, x - 4.0, x + 4.0, y - 4.0, y + 4.0].map(coordinate);
     let _infallible = match ink {
         Ink::First => {
             write!(out, "<circle class=\"mark {class}\" cx=\"{x}\" cy=\"{y}\" r=\"3.5\"/>")
@@ -338,7 +342,7 @@ fn marker(out: &mut String, ink: Ink, x: f64, y: f64) {
 
 fn text(out: &mut String, class: &str, x: f64, y: f64, words: &str) {
     if !words.is_empty() {
-        let (x, y, words) = (short(x), short(y), escaped(words));
+        let (x, y, words) = (coordinate(x), coordinate(y), escape(words));
         let _infallible = write!(out, "<text class=\"{class}\" x=\"{x}\" y=\"{y}\">{words}</text>");
     }
 }
@@ -362,7 +366,7 @@ fn class(ink: Ink) -> &'static str {
 }
 
 /// Returns a coordinate to a tenth: a screen shows no less.
-fn short(value: f64) -> String {
+fn coordinate(value: f64) -> String {
     let text = format!("{value:.1}");
     let text = text.strip_suffix(".0").unwrap_or(&text);
     if text == "-0" { "0".to_owned() } else { text.to_owned() }

@@ -41,9 +41,9 @@ pub(crate) fn overlay(runs: &[(String, &VelocitySample)]) -> Vec<Figure> {
         let seen = density.into_iter().map(|[x, y]| [x, if y >= lowest { y } else { f64::NAN }]);
         logarithmic.layer(name.clone(), ink, Shape::Line(seen.collect()));
     }
-    distributions.y = distributions.y.spanning(0.0, 1.0);
+    distributions.y = distributions.y.with_ends(0.0, 1.0);
     logarithmic.y =
-        Axis::logarithmic("density (1/(m/s)), logarithmic").spanning(lowest, 2.0 * highest);
+        Axis::logarithmic("density (1/(m/s)), logarithmic").with_ends(lowest, 2.0 * highest);
     let left_out = match runs.len() - shown.len() {
         0 => String::new(),
         more => format!(" The last {more} runs are not drawn."),

@@ -13,11 +13,11 @@ const ROWS_MAX: usize = 600;
 
 /// Returns the figures of the search, if its history is known.
 pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
-    SearchCourse::of_finding(finding).map(|course| of_course(&course)).unwrap_or_default()
+    SearchCourse::from_finding(finding).map(|course| course_figures(&course)).unwrap_or_default()
 }
 
 /// Returns the figures of a search of two evaluations or more.
-pub(crate) fn of_course(course: &SearchCourse) -> Vec<Figure> {
+pub(crate) fn course_figures(course: &SearchCourse) -> Vec<Figure> {
     if course.rows.len() < 2 {
         return Vec::new();
     }
@@ -56,7 +56,7 @@ fn cost(course: &SearchCourse) -> Figure {
     let level = course.noise_level;
     let y = if positive && smallest < largest {
         let low = level.map_or(smallest, |level| level.min(smallest)).max(largest * 1e-16);
-        Axis::logarithmic("cost").spanning(low / 2.0, largest * 2.0)
+        Axis::logarithmic("cost").with_ends(low / 2.0, largest * 2.0)
     } else {
         Axis::linear("cost")
     };
@@ -121,7 +121,7 @@ fn parameters(course: &SearchCourse) -> Option<Figure> {
     if free.is_empty() {
         return None;
     }
-    let y = Axis::linear("place between the bounds (0: lower, 1: upper)").spanning(0.0, 1.0);
+    let y = Axis::linear("place between the bounds (0: lower, 1: upper)").with_ends(0.0, 1.0);
     let title = format!("Parameters within their bounds{}", course.suffix);
     let name = format!("{}search-parameters", course.prefix);
     let mut chart = Chart::new(name, title, Axis::linear(X), y);

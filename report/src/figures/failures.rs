@@ -14,7 +14,7 @@ const PLACES: usize = 50;
 
 /// Returns the figures, if any realization failed.
 pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
-    if finding.failed() == 0 {
+    if finding.failed_realizations() == 0 {
         return Vec::new();
     }
     let failures = FailedRealizations {
@@ -23,8 +23,8 @@ pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
         prefix: finding.prefix(),
         suffix: finding.suffix(),
     };
-    let mut figures = vec![by_kind(&failures)];
-    figures.extend(along_indices(finding));
+    let mut figures = vec![failures_by_kind(&failures)];
+    figures.extend(failures_along_indices(finding));
     figures
 }
 
@@ -40,13 +40,12 @@ pub(crate) struct FailedRealizations {
     pub(crate) suffix: String,
 }
 
-/// Returns the figure of failures by kind.
-pub(crate) fn by_kind(failures: &FailedRealizations) -> Figure {
+pub(crate) fn failures_by_kind(failures: &FailedRealizations) -> Figure {
     let FailedRealizations { kinds, realizations, prefix, suffix } = failures;
     let names = kinds.iter().map(|(kind, _)| quantity::failure(kind.name())).collect();
-    let y = Axis::of_categories("", names);
+    let y = Axis::with_categories("", names);
     let largest = kinds.iter().map(|(_, count)| *count).max().unwrap_or(1) as f64;
-    let x = Axis::linear("failed realizations").spanning(0.0, 1.08 * largest);
+    let x = Axis::linear("failed realizations").with_ends(0.0, 1.08 * largest);
     let title = format!("Failures by kind{suffix}");
     let mut chart = Chart::new(format!("{prefix}failures"), title, x, y);
     let counts = kinds.iter();
@@ -69,7 +68,7 @@ pub(crate) fn by_kind(failures: &FailedRealizations) -> Figure {
     Figure { chart, reading }
 }
 
-fn along_indices(finding: &Finding<'_>) -> Option<Figure> {
+fn failures_along_indices(finding: &Finding<'_>) -> Option<Figure> {
     let outcomes = &finding.model;
     if outcomes.failures.is_empty() || outcomes.count == 0 {
         return None;
@@ -79,7 +78,7 @@ fn along_indices(finding: &Finding<'_>) -> Option<Figure> {
         kinds.entry(kind).or_default().push(*index);
     }
     let width = (outcomes.count as f64 / PLACES as f64).max(1.0);
-    let x = Axis::linear("index of the realization").spanning(0.0, outcomes.count as f64);
+    let x = Axis::linear("index of the realization").with_ends(0.0, outcomes.count as f64);
     let y = Axis::linear(format!("failures among {} neighbours", width.ceil()));
     let title = format!("Where failures sit{}", finding.suffix());
     let name = format!("{}failures-by-index", finding.prefix());

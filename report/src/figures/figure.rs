@@ -5,7 +5,6 @@ use crate::chart::Chart;
 /// A chart, and how to read it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Figure {
-    /// The chart.
     pub(crate) chart: Chart,
     /// Two sentences on how to read it.
     pub(crate) reading: String,

@@ -10,7 +10,7 @@ pub(crate) const GROUPS_MAX: usize = 60;
 /// Returns the figures that compare the groups: what was identified, and what was measured.
 pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
     let shown = &findings[..findings.len().min(GROUPS_MAX)];
-    let identified = |finding: &Finding<'_>, dispersion: bool| -> ForestRow {
+    let identified_row = |finding: &Finding<'_>, dispersion: bool| -> ForestRow {
         if let Some(posterior) = finding.posterior {
             let quantity = if dispersion {
                 posterior.parameters.get(&osteon_common::parameters::Parameter::Dispersion)
@@ -24,7 +24,7 @@ pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
             found.map(|found| if dispersion { &found.dispersion } else { &found.bulk_velocity });
         (quantity.and_then(|one| one.value), quantity.and_then(|one| one.ends()))
     };
-    let measured = |finding: &Finding<'_>, variation: bool| -> ForestRow {
+    let measured_row = |finding: &Finding<'_>, variation: bool| -> ForestRow {
         let moment = osteon_files::report::Moment::ALL[usize::from(variation)];
         let data = finding.data;
         let ends = data.and_then(|data| data.intervals()).map(|both| both.get(moment));
@@ -36,25 +36,25 @@ pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
             "groups-bulk-velocity",
             "√(c₁₁₁₁/ρ) of each group",
             "√(c₁₁₁₁/ρ) (m/s)",
-            shown.iter().map(|one| identified(one, false)).collect(),
+            shown.iter().map(|one| identified_row(one, false)).collect(),
         ),
         (
             "groups-dispersion",
             "Dispersion of each group",
             "dispersion δ",
-            shown.iter().map(|one| identified(one, true)).collect(),
+            shown.iter().map(|one| identified_row(one, true)).collect(),
         ),
         (
             "groups-mean",
             "Mean of each group's measured velocities",
             "mean (m/s)",
-            shown.iter().map(|one| measured(one, false)).collect(),
+            shown.iter().map(|one| measured_row(one, false)).collect(),
         ),
         (
             "groups-variation",
             "Coefficient of variation of each group's measured velocities",
             "coefficient of variation",
-            shown.iter().map(|one| measured(one, true)).collect(),
+            shown.iter().map(|one| measured_row(one, true)).collect(),
         ),
     ];
     let figures = all.into_iter();
@@ -73,19 +73,19 @@ fn figure(
     places: &[ForestRow],
 ) -> Figure {
     let names = findings.iter().map(|one| one.group.unwrap_or_default().to_owned()).collect();
-    let y = Axis::of_categories("", names);
+    let y = Axis::with_categories("", names);
     let mut chart = Chart::new(name, title, Axis::linear(label), y);
     chart.height = (0.1 * places.len() as f64).max(0.35);
     let rows = || places.iter().enumerate();
     let intervals =
         rows().filter_map(|(row, (_, ends))| ends.map(|[low, high]| [low, high, row as f64]));
     chart.layer("95 % interval", Ink::First, Shape::Intervals(intervals.collect()));
-    let with = |interval: bool| {
+    let points_with = |interval: bool| {
         let of = rows().filter(move |(_, (_, ends))| ends.is_some() == interval);
         of.filter_map(|(row, (value, _))| Some([(*value)?, row as f64])).collect::<Vec<_>>()
     };
-    chart.layer("value", Ink::First, Shape::Points(with(true)));
-    let without = with(false);
+    chart.layer("value", Ink::First, Shape::Points(points_with(true)));
+    let without = points_with(false);
     let mut reading = "Each row is a group: its value and its 95 % interval. Intervals that do not \
                        overlap are different; two that overlap a little may be, too, which the table \
                        of differences decides."

@@ -17,7 +17,7 @@ const FEWEST: f64 = 5.0;
 pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let Some(sample) = &finding.model.velocities else { return Vec::new() };
     let running: Vec<Running> =
-        sample.running(STEPS).into_iter().filter(|one| one.count >= FEWEST).collect();
+        sample.running_moments(STEPS).into_iter().filter(|one| one.count >= FEWEST).collect();
     if running.len() < 2 {
         return Vec::new();
     }
@@ -33,7 +33,7 @@ fn figure(finding: &Finding<'_>, moment: Moment, running: &[Running]) -> Figure 
             "coefficient of variation",
         ),
     };
-    let of = |one: &Running| match moment {
+    let value = |one: &Running| match moment {
         Moment::Mean => one.mean,
         Moment::CoefficientOfVariation => one.variation,
     };
@@ -43,11 +43,11 @@ fn figure(finding: &Finding<'_>, moment: Moment, running: &[Running]) -> Figure 
         Chart::new(format!("{}{name}", finding.prefix()), title, x, Axis::linear(label));
     chart.description = format!("{} numbers of realizations.", running.len());
     let band = running.iter().map(|one| {
-        let [value, error] = of(one);
+        let [value, error] = value(one);
         [one.count, value - NORMAL_95 * error, value + NORMAL_95 * error]
     });
     chart.layer("95 % interval", Ink::First, Shape::Band(band.collect()));
-    let line = running.iter().map(|one| [one.count, of(one)[0]]).collect();
+    let line = running.iter().map(|one| [one.count, value(one)[0]]).collect();
     chart.layer("model", Ink::First, Shape::Line(line));
     if let Some(data) = finding.data.and_then(|data| data.moments.get(moment)) {
         chart.layer("measured", Ink::Second, Shape::Level(data));

@@ -24,7 +24,7 @@ fn figure(finding: &Finding<'_>, parameter: Parameter) -> Option<Figure> {
         groups.as_ref().is_none_or(|groups| Some(groups[*row]) == finding.group)
     });
     let draws = VelocitySample::new(draws.map(|(_, value)| value / unit.size).collect())?;
-    let label = unit.after(&format!("{} {}", parameter.row().title, parameter.row().symbol));
+    let label = unit.axis_label(&format!("{} {}", parameter.row().title, parameter.row().symbol));
     let file = format!("{}posterior-{}", finding.prefix(), parameter.name().replace('_', "-"));
     let title = format!("Posterior of the {}{}", parameter.row().title, finding.suffix());
     let mut chart = Chart::new(file, title, Axis::linear(label), Axis::linear("density"));

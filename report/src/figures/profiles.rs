@@ -11,7 +11,8 @@ pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
     let figure = |(parameter, profile): (&_, &osteon_files::report::ParameterProfile)| {
         let parameter = *parameter;
         let unit = unit(parameter);
-        let label = unit.after(&format!("{} {}", parameter.row().title, parameter.row().symbol));
+        let label =
+            unit.axis_label(&format!("{} {}", parameter.row().title, parameter.row().symbol));
         let points = profile.values.iter().zip(&profile.costs);
         let points: Vec<[f64; 2]> =
             points.map(|(value, cost)| [value / unit.size, cost.unwrap_or(f64::NAN)]).collect();

@@ -28,7 +28,7 @@ pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
 
 fn sequence(sample: &VelocitySample, name: String, title: String, ink: Ink) -> Figure {
     let velocities = sample.in_order();
-    let x = Axis::linear("index").spanning(0.0, velocities.len() as f64);
+    let x = Axis::linear("index").with_ends(0.0, velocities.len() as f64);
     let mut chart = Chart::new(name, title, x, Axis::linear("velocity (m/s)"));
     chart.description = format!("{} velocities.", sample.len());
     let reading = if velocities.len() <= DOTS_MAX {

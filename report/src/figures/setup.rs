@@ -7,7 +7,7 @@ use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::quantity::{LENGTH, Precision};
 
 /// Returns the figure of the set-up.
-pub(crate) fn of_setup(setup: &Setup) -> Figure {
+pub(crate) fn setup_figure(setup: &Setup) -> Figure {
     let mm = |length: f64| length / LENGTH.size;
     let (layers, probe) = (&setup.layers, &setup.probe);
     let places: Vec<[f64; 2]> = probe
@@ -34,8 +34,8 @@ pub(crate) fn of_setup(setup: &Setup) -> Figure {
     let most = (right - left) * 0.4;
     let [shown_above, shown_below] = [above.min(most), below.min(most)];
     let top = all_heights(&places, &sources).fold(shown_above, f64::max);
-    let x = Axis::linear(LENGTH.after("x₁ along the bone")).spanning(left, right);
-    let y = Axis::linear(LENGTH.after("x₃")).spanning(-bone - shown_below, top);
+    let x = Axis::linear(LENGTH.axis_label("x₁ along the bone")).with_ends(left, right);
+    let y = Axis::linear(LENGTH.axis_label("x₃")).with_ends(-bone - shown_below, top);
     let mut chart = Chart::new("setup", "The set-up, to scale", x, y);
     chart.to_scale = true;
     let show = |length: f64| LENGTH.show(length * LENGTH.size, Precision::Digits(3));

@@ -9,13 +9,15 @@ const DRAWN_MAX: usize = 60;
 
 /// Returns the figure, if there were several starts.
 pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
-    let (Some(solutions), free) = (finding.solutions, finding.free()) else { return Vec::new() };
+    let (Some(solutions), free) = (finding.solutions, finding.free_parameters()) else {
+        return Vec::new();
+    };
     if free.len() < 2 || solutions.points.is_empty() {
         return Vec::new();
     }
     let names = free.iter().map(|parameter| parameter.row().symbol.to_owned()).collect();
-    let x = Axis::of_categories("free parameter", names);
-    let y = Axis::linear("place between the bounds (0: lower, 1: upper)").spanning(0.0, 1.0);
+    let x = Axis::with_categories("free parameter", names);
+    let y = Axis::linear("place between the bounds (0: lower, 1: upper)").with_ends(0.0, 1.0);
     let title = format!("Solutions from {} starts{}", solutions.points.len(), finding.suffix());
     let mut chart = Chart::new(format!("{}solutions", finding.prefix()), title, x, y);
     let described = free.iter().map(|one| format!("{} ({})", one.row().symbol, one.row().title));

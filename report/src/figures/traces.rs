@@ -13,7 +13,7 @@ const PARTS_MAX: usize = 500;
 const FILL: f64 = 0.45;
 
 /// Returns the figures of the traces.
-pub(crate) fn of_traces(result: &Simulation, context: &SimulationContext) -> Vec<Figure> {
+pub(crate) fn trace_figures(result: &Simulation, context: &SimulationContext) -> Vec<Figure> {
     let mut figures = Vec::new();
     if let Some((times, traces)) = &context.traces {
         figures.push(record(result, context, times, traces));
@@ -31,10 +31,10 @@ fn record(
     let places: Vec<f64> = result.receivers.iter().map(|one| one.x1 / LENGTH.size).collect();
     let pitch = places.windows(2).map(|two| (two[1] - two[0]).abs()).fold(f64::INFINITY, f64::min);
     let pitch = if pitch.is_finite() { pitch } else { 1.0 };
-    let picked = || result.receivers.iter().filter_map(|one| one.time);
+    let picked_times = || result.receivers.iter().filter_map(|one| one.time);
     // The guided waves that follow are far larger than the first packet.
     let period = 1.0 / context.case.setup.probe.center_frequency;
-    let (first, last) = picked()
+    let (first, last) = picked_times()
         .fold((f64::INFINITY, 0.0_f64), |(first, last), time| (first.min(time), last.max(time)));
     let shown = if first <= last {
         [(first - 2.0 * period).max(0.0), last + 1.5 * period]
@@ -43,8 +43,8 @@ fn record(
     };
     let from = times.partition_point(|time| *time < shown[0]);
     let to = times.partition_point(|time| *time <= shown[1]);
-    let x = Axis::linear(TIME.after("time"));
-    let y = Axis::linear(LENGTH.after("receiver’s x₁, with its pressure"));
+    let x = Axis::linear(TIME.axis_label("time"));
+    let y = Axis::linear(LENGTH.axis_label("receiver’s x₁, with its pressure"));
     let mut chart = Chart::new("traces", "Pressures at the receivers, and picked times", x, y);
     chart.height = 1.6;
     chart.description = format!("{} receivers.", traces.len());
@@ -60,7 +60,7 @@ fn record(
         };
         let scale = if own > 0.0 { FILL * pitch / own } else { 0.0 };
         let to = to.min(trace.len());
-        let points = thinned(&times[from.min(to)..to], &trace[from.min(to)..to]);
+        let points = thin_trace(&times[from.min(to)..to], &trace[from.min(to)..to]);
         let height = |one: f64| place + (one * scale).clamp(-pitch, pitch);
         let line = points.into_iter().map(|[time, one]| [time / TIME.size, height(one)]);
         chart.layer("", Ink::First, Shape::Line(line.collect()));
@@ -90,7 +90,7 @@ fn largest_around(times: &[f64], trace: &[f64], time: f64, period: f64) -> f64 {
 }
 
 /// Returns a trace with the smallest and the largest pressure of each part.
-fn thinned(times: &[f64], trace: &[f64]) -> Vec<[f64; 2]> {
+fn thin_trace(times: &[f64], trace: &[f64]) -> Vec<[f64; 2]> {
     let size = times.len().div_ceil(PARTS_MAX).max(1);
     let mut points = Vec::new();
     for part in (0..times.len()).collect::<Vec<_>>().chunks(size) {
@@ -119,13 +119,14 @@ fn line(result: &Simulation) -> Option<Figure> {
     let spread: f64 = points.iter().map(|point| (point[0] - x) * (point[0] - x)).sum();
     let both: f64 = points.iter().map(|point| (point[0] - x) * (point[1] - t)).sum();
     let slope = both / spread;
-    let fitted = |place: f64| t + slope * (place - x);
-    let axis = Axis::linear(LENGTH.after("receiver’s x₁"));
-    let y = Axis::linear(TIME.after("picked time"));
+    let line_time = |place: f64| t + slope * (place - x);
+    let axis = Axis::linear(LENGTH.axis_label("receiver’s x₁"));
+    let y = Axis::linear(TIME.axis_label("picked time"));
     let mut chart = Chart::new("times", "Picked times and the fitted line", axis, y);
-    let ends = [points[0][0], points[points.len() - 1][0]].map(|place| [place, fitted(place)]);
+    let ends = [points[0][0], points[points.len() - 1][0]].map(|place| [place, line_time(place)]);
     chart.layer("least-squares line", Ink::First, Shape::Line(ends.to_vec()));
-    let off = points.iter().map(|[place, time]| (time - fitted(*place)).abs()).fold(0.0, f64::max);
+    let off =
+        points.iter().map(|[place, time]| (time - line_time(*place)).abs()).fold(0.0, f64::max);
     chart.description = format!("{} picked times.", points.len());
     chart.layer("picked time", Ink::Second, Shape::Points(points));
     let velocity = result.velocity.map_or_else(String::new, |velocity| {

@@ -38,28 +38,28 @@ struct ComparedSamples<'a> {
 
 impl ComparedSamples<'_> {
     /// Returns which there are, with their names and colours.
-    fn named(&self) -> impl Iterator<Item = (&'static str, Ink, &VelocitySample)> {
+    fn named_samples(&self) -> impl Iterator<Item = (&'static str, Ink, &VelocitySample)> {
         let model = self.model.map(|sample| (MODEL, Ink::First, sample));
         model.into_iter().chain(self.measured.map(|sample| (MEASURED, Ink::Second, sample)))
     }
 
     /// Returns what both are, in words.
-    fn described(&self) -> String {
+    fn describe(&self) -> String {
         let one = |(name, _, sample): (&str, Ink, &VelocitySample)| {
             let [low, high] = sample.range().map(|velocity| digits(velocity, 5));
             format!("{} {name} velocities from {low} to {high} m/s.", sample.len())
         };
-        self.named().map(one).collect::<Vec<_>>().join(" ")
+        self.named_samples().map(one).collect::<Vec<_>>().join(" ")
     }
 
     fn distribution(&self, name: String, title: String) -> Figure {
-        let y = Axis::linear("share of velocities up to this one").spanning(0.0, 1.0);
+        let y = Axis::linear("share of velocities up to this one").with_ends(0.0, 1.0);
         let mut chart = Chart::new(name, title, Axis::linear(AXIS), y);
-        chart.description = self.described();
+        chart.description = self.describe();
         if let Some(measured) = self.measured {
             chart.layer("measured, 95 % band", Ink::Second, Shape::Band(measured.band()));
         }
-        for (name, ink, sample) in self.named() {
+        for (name, ink, sample) in self.named_samples() {
             chart.layer(name, ink, Shape::Line(sample.distribution()));
         }
         let reading = match (self.model, self.measured) {
@@ -85,7 +85,7 @@ impl ComparedSamples<'_> {
     fn density(&self, name: String, title: String) -> Figure {
         let y = Axis::linear("density (1/(m/s))");
         let mut chart = Chart::new(name, title, Axis::linear(AXIS), y);
-        chart.description = self.described();
+        chart.description = self.describe();
         let bars = self.measured.or(self.model);
         if let Some(bars) = bars {
             let (name, ink) = match self.measured {
@@ -94,11 +94,11 @@ impl ComparedSamples<'_> {
             };
             chart.layer(name, ink, Shape::Bars(bars.histogram()));
         }
-        for (name, ink, sample) in self.named() {
+        for (name, ink, sample) in self.named_samples() {
             chart.layer(format!("{name}, smoothed"), ink, Shape::Line(sample.density()));
         }
         let widths = self
-            .named()
+            .named_samples()
             .map(|(name, _, sample)| format!("{} m/s ({name})", digits(sample.bandwidth(), 3)));
         let widths = widths.collect::<Vec<_>>().join(" and ");
         let reading = format!(
@@ -110,15 +110,16 @@ impl ComparedSamples<'_> {
     }
 
     fn logarithmic(&self, name: String, title: String) -> Figure {
-        let lowest = self.named().map(|(_, _, sample)| sample.lowest_density());
+        let lowest = self.named_samples().map(|(_, _, sample)| sample.lowest_density());
         let lowest = lowest.fold(f64::INFINITY, f64::min);
         let densities: Vec<(&str, Ink, Vec<[f64; 2]>)> =
-            self.named().map(|(name, ink, sample)| (name, ink, sample.density())).collect();
+            self.named_samples().map(|(name, ink, sample)| (name, ink, sample.density())).collect();
         let all = densities.iter().flat_map(|(_, _, line)| line.iter().map(|[_, height]| *height));
         let highest = all.fold(0.0, f64::max);
-        let y = Axis::logarithmic("density (1/(m/s)), logarithmic").spanning(lowest, 2.0 * highest);
+        let y =
+            Axis::logarithmic("density (1/(m/s)), logarithmic").with_ends(lowest, 2.0 * highest);
         let mut chart = Chart::new(name, title, Axis::linear(AXIS), y);
-        chart.description = self.described();
+        chart.description = self.describe();
         for (name, ink, line) in densities {
             // Farther out there is nothing but the kernel.
             let line = line.into_iter();
@@ -156,8 +157,8 @@ impl ComparedSamples<'_> {
         let half = NORMAL_95 * libm::sqrt(variance);
         let x = Axis::linear("model's distribution function at a measured velocity");
         let y = Axis::linear("velocities relative to the expected number");
-        let mut chart = Chart::new(name, title, x.spanning(0.0, 1.0), y);
-        chart.description = format!("{} {places} places of equal probability.", self.described());
+        let mut chart = Chart::new(name, title, x.with_ends(0.0, 1.0), y);
+        chart.description = format!("{} {places} places of equal probability.", self.describe());
         let band = [0.0, 1.0].map(|x| [x, (1.0 - half).max(0.0), 1.0 + half]);
         chart.layer("expected, 95 % of the bars", Ink::Muted, Shape::Band(band.to_vec()));
         chart.layer("measured", Ink::Second, Shape::Bars(bars.collect()));

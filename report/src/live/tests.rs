@@ -28,7 +28,7 @@ fn row(specification: &JobSpecification, number: u64, cost: f64) -> Evaluation {
 #[test]
 fn a_search_has_figures_from_its_second_evaluation_on() {
     let specification = specification();
-    let mut course = SearchCourse::of_job(&specification, 0);
+    let mut course = SearchCourse::for_job(&specification, 0);
     course.set_data(&DataSummary::from_data(specification.data.as_ref().unwrap(), 0));
     course.add(&row(&specification, 0, 0.5));
     assert_eq!(search_figures(&course), []);
@@ -53,7 +53,7 @@ fn a_search_has_figures_from_its_second_evaluation_on() {
 #[test]
 fn a_long_search_is_thinned_and_keeps_its_best() {
     let specification = specification();
-    let mut course = SearchCourse::of_job(&specification, 0);
+    let mut course = SearchCourse::for_job(&specification, 0);
     let count = 50_000;
     for number in 0..count {
         let cost = if number == 12_345 { 1e-9 } else { 1.0 };

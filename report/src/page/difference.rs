@@ -9,7 +9,7 @@ use crate::finding::Finding;
 use crate::input::{ReportedRun, RunContent};
 use crate::quantity::{NUMBER, Unit, VELOCITY, unit};
 use crate::sample::NORMAL_95;
-use crate::text::{escaped, shortened};
+use crate::text::{escape, shorten};
 
 /// Most runs or groups in the table.
 const COLUMNS_MAX: usize = 8;
@@ -28,10 +28,10 @@ pub(super) fn table(all: &[(String, usize, &Finding<'_>)], runs: &[ReportedRun])
         .collect();
     let mut out = String::new();
     if velocities.len() > 1 {
-        out.push_str(&of_simulations(&velocities));
+        out.push_str(&simulations_table(&velocities));
     }
     if all.len() > 1 {
-        out.push_str(&of_findings(&all[..all.len().min(COLUMNS_MAX)]));
+        out.push_str(&findings_table(&all[..all.len().min(COLUMNS_MAX)]));
         if all.len() > COLUMNS_MAX {
             out.push_str(&format!("<p>The first {COLUMNS_MAX} of {} are compared.</p>", all.len()));
         }
@@ -39,23 +39,23 @@ pub(super) fn table(all: &[(String, usize, &Finding<'_>)], runs: &[ReportedRun])
     out
 }
 
-fn of_simulations(velocities: &[(String, Option<f64>)]) -> String {
+fn simulations_table(velocities: &[(String, Option<f64>)]) -> String {
     let first = velocities[0].1.unwrap_or(f64::NAN);
     let rows: Vec<Vec<String>> = velocities
         .iter()
         .map(|(name, velocity)| {
             let velocity = velocity.unwrap_or(f64::NAN);
-            let shown = |value| VELOCITY.show(value, crate::quantity::Precision::Digits(7));
-            vec![escaped(name), shown(velocity), shown(velocity - first)]
+            let show = |value| VELOCITY.show(value, crate::quantity::Precision::Digits(7));
+            vec![escape(name), show(velocity), show(velocity - first)]
         })
         .collect();
     let columns = ["Run", "Velocity (m/s)", "Minus that of the first (m/s)"];
     markup_table("Velocities of the simulations", &columns, &rows)
 }
 
-fn of_findings(all: &[(String, usize, &Finding<'_>)]) -> String {
-    let mut columns = vec!["Quantity".to_owned(), shortened(&all[0].0, 40)];
-    columns.extend(all[1..].iter().map(|(name, ..)| format!("{} minus it", shortened(name, 40))));
+fn findings_table(all: &[(String, usize, &Finding<'_>)]) -> String {
+    let mut columns = vec!["Quantity".to_owned(), shorten(&all[0].0, 40)];
+    columns.extend(all[1..].iter().map(|(name, ..)| format!("{} minus it", shorten(name, 40))));
     let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
     let findings: Vec<&Finding<'_>> = all.iter().map(|(_, _, finding)| *finding).collect();
     let mut rows = Vec::new();
@@ -65,7 +65,7 @@ fn of_findings(all: &[(String, usize, &Finding<'_>)]) -> String {
             if found.iter().flatten().count() < 2 {
                 return;
             }
-            let mut row = vec![escaped(&unit.after(&name))];
+            let mut row = vec![escape(&unit.axis_label(&name))];
             let first = found[0].unwrap_or([f64::NAN; 3]);
             row.push(difference(first, unit).replace("<strong>", "").replace("</strong>", ""));
             let minus_first = |one: &Option<EstimateWithEnds>| {
@@ -85,7 +85,7 @@ fn of_findings(all: &[(String, usize, &Finding<'_>)]) -> String {
     add("√(c₁₁₁₁/ρ)".to_owned(), VELOCITY, &bulk_velocity);
     for parameter in Parameter::ALL {
         let name = format!("{} {}", parameter.row().title, parameter.row().symbol);
-        add(name, unit(parameter), &|one| determined(one, parameter));
+        add(name, unit(parameter), &|one| determined_estimate(one, parameter));
     }
     let mut out = markup_table("Differences from the first, with 95 % intervals", &columns, &rows);
     out.push_str(
@@ -130,7 +130,7 @@ fn bulk_velocity(finding: &Finding<'_>) -> Option<EstimateWithEnds> {
 }
 
 /// Returns a parameter that the data determine; `None` for one that they leave open, or that is fixed.
-fn determined(finding: &Finding<'_>, parameter: Parameter) -> Option<EstimateWithEnds> {
+fn determined_estimate(finding: &Finding<'_>, parameter: Parameter) -> Option<EstimateWithEnds> {
     if let Some(posterior) = finding.posterior {
         let found = posterior.parameters.get(&parameter)?;
         let [low, high] = found.ends()?;

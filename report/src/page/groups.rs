@@ -5,7 +5,7 @@ use crate::finding::Finding;
 use crate::input::JobContext;
 use crate::quantity::{NUMBER, Precision, Unit, VELOCITY};
 use crate::table::NumberTable;
-use crate::text::{escaped, shortened};
+use crate::text::{escape, shorten};
 
 /// Most groups of which all differences are shown.
 const COMPARED_MAX: usize = 12;
@@ -68,14 +68,14 @@ fn row(numbers: &Numbers, finding: &Finding<'_>) -> Vec<String> {
     let [bulk, bulk_interval] = quantity(false, VELOCITY);
     let [dispersion, dispersion_interval] = quantity(true, NUMBER);
     vec![
-        escaped(finding.group.unwrap_or_default()),
+        escape(finding.group.unwrap_or_default()),
         count.map_or_else(none, |count| count.to_string()),
         status,
         bulk,
         bulk_interval,
         dispersion,
         dispersion_interval,
-        finding.failed().to_string(),
+        finding.failed_realizations().to_string(),
     ]
 }
 
@@ -89,7 +89,7 @@ pub(super) fn differences(context: &JobContext, findings: &[Finding<'_>]) -> Opt
     let bulk = matrix(table, &names, "bulk_velocity_difference", VELOCITY)?;
     let dispersion = matrix(table, &names, "dispersion_difference", NUMBER)?;
     let mut columns = vec!["Minus →"];
-    let short: Vec<String> = names.iter().map(|name| shortened(name, 24)).collect();
+    let short: Vec<String> = names.iter().map(|name| shorten(name, 24)).collect();
     columns.extend(short.iter().map(String::as_str));
     let mut out = super::markup::table(
         "√(c₁₁₁₁/ρ) of the row’s group minus that of the column’s (m/s), with 95 % interval",
@@ -131,7 +131,7 @@ fn matrix(table: &NumberTable, names: &[&str], key: &str, unit: Unit) -> Option<
     };
     let row = |name: &&str| {
         let cells = names.iter().map(|column| cell(name, column));
-        std::iter::once(escaped(name)).chain(cells).collect()
+        std::iter::once(escape(name)).chain(cells).collect()
     };
     Some(names.iter().map(row).collect())
 }

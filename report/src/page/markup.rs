@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::quantity::{Precision, Unit};
-use crate::text::escaped;
+use crate::text::escape;
 
 /// Numbers of one run: each is in the page with all its digits and its place in `result.json`.
 pub(super) struct Numbers {
@@ -12,7 +12,7 @@ pub(super) struct Numbers {
 
 impl Numbers {
     /// Numbers of the run with this number, from 0.
-    pub(super) fn of_run(run: usize) -> Self {
+    pub(super) fn for_run(run: usize) -> Self {
         Self { run }
     }
 
@@ -26,7 +26,7 @@ impl Numbers {
     ) -> String {
         let Some(value) = value else { return none() };
         let Self { run } = self;
-        let (place, size, shown) = (escaped(place), unit.size, unit.show(value, precision));
+        let (place, size, shown) = (escape(place), unit.size, unit.show(value, precision));
         format!(
             "<data value=\"{value:?}\" data-run=\"{run}\" data-at=\"{place}\" data-size=\"{size:e}\">\
              {shown}</data>"
@@ -61,10 +61,10 @@ pub(super) fn table(caption: &str, columns: &[&str], rows: &[Vec<String>]) -> St
     let mut out = format!(
         "<div class=\"table\" tabindex=\"0\" role=\"group\" aria-label=\"{0}\"><table><caption>{0}\
          </caption><thead><tr>",
-        escaped(caption)
+        escape(caption)
     );
     for column in columns {
-        let _infallible = write!(out, "<th scope=\"col\">{}</th>", escaped(column));
+        let _infallible = write!(out, "<th scope=\"col\">{}</th>", escape(column));
     }
     out.push_str("</tr></thead><tbody>");
     for row in rows {
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn a_number_has_all_its_digits_and_its_place() {
-        let numbers = Numbers::of_run(1);
+        let numbers = Numbers::for_run(1);
         let shown = numbers.number(Some(3907.687), "/a/b", VELOCITY, Precision::Error(2.0));
         assert_eq!(
             shown,
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn an_interval_is_rounded_to_its_width() {
-        let shown = Numbers::of_run(0).interval(Some([0.09, 0.11]), "/a", NUMBER);
+        let shown = Numbers::for_run(0).interval(Some([0.09, 0.11]), "/a", NUMBER);
         assert!(
             shown.contains(">0.0900</data> to ") && shown.contains(">0.1100</data>"),
             "{shown}"

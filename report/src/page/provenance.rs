@@ -5,17 +5,17 @@ use osteon_files::report::Solver;
 
 use super::markup::table;
 use crate::input::{ReportedRun, RunContent};
-use crate::text::escaped;
+use crate::text::escape;
 
 /// Returns the table of the origin of a result, and the command that reproduces it.
-pub(super) fn of_run(run: &ReportedRun) -> String {
+pub(super) fn origin_table(run: &ReportedRun) -> String {
     let mut rows: Vec<(&str, String)> = Vec::new();
     let command = match &run.content {
         RunContent::Identification(result, context) => {
             rows.push(("computed by", program(&result.version, result.commit.as_deref())));
             rows.push(("revision of the numerics", result.numerics.to_string()));
             rows.push(("digest of the evaluations", result.digest.clone()));
-            rows.extend(sampling(&context.specification.monte_carlo));
+            rows.extend(sampling_rows(&context.specification.monte_carlo));
             rows.push(("evaluations of the search", result.evaluations.to_string()));
             rows.push(("search", result.search.method.name().to_owned()));
             rows.push(("objective", result.objective.name().replace('_', " ")));
@@ -26,7 +26,7 @@ pub(super) fn of_run(run: &ReportedRun) -> String {
             rows.push(("computed by", program(&result.version, result.commit.as_deref())));
             rows.push(("revision of the numerics", result.numerics.to_string()));
             rows.push(("digest of the evaluation", result.digest.clone()));
-            rows.extend(sampling(&context.specification.monte_carlo));
+            rows.extend(sampling_rows(&context.specification.monte_carlo));
             rows.push(("solver", solver(&result.solver)));
             "osteon propagate job.toml --out again"
         }
@@ -39,7 +39,7 @@ pub(super) fn of_run(run: &ReportedRun) -> String {
     };
     let rows: Vec<Vec<String>> = rows
         .into_iter()
-        .map(|(name, value)| vec![name.to_owned(), format!("<code>{}</code>", escaped(&value))])
+        .map(|(name, value)| vec![name.to_owned(), format!("<code>{}</code>", escape(&value))])
         .collect();
     let repeat = match &run.content {
         RunContent::Simulation(..) => {
@@ -64,7 +64,7 @@ fn program(version: &str, commit: Option<&str>) -> String {
     }
 }
 
-fn sampling(settings: &MonteCarlo) -> Vec<(&'static str, String)> {
+fn sampling_rows(settings: &MonteCarlo) -> Vec<(&'static str, String)> {
     vec![
         ("realizations of each evaluation", settings.realizations.to_string()),
         ("seed", settings.seed.to_string()),

@@ -7,12 +7,12 @@ use osteon_files::report::{Moment, QuantityEstimate};
 use super::markup::{Numbers, none, table, width_precision};
 use crate::finding::Finding;
 use crate::quantity::{NUMBER, Precision, Unit, VELOCITY, unit};
-use crate::text::escaped;
+use crate::text::escape;
 
 /// Returns the tables: the moments, what the data determine, and the parameters.
 pub(super) fn tables(numbers: &Numbers, finding: &Finding<'_>) -> String {
     let mut out = moments(numbers, finding);
-    if let Some(found) = determined(numbers, finding) {
+    if let Some(found) = moments_table(numbers, finding) {
         out.push_str(&found);
     }
     out.push_str(&parameters(numbers, finding));
@@ -63,7 +63,7 @@ fn moments(numbers: &Numbers, finding: &Finding<'_>) -> String {
 
 /// Returns the table of the two quantities that the moments determine; `None` of a propagation, and
 /// where derivatives and posterior are missing.
-fn determined(numbers: &Numbers, finding: &Finding<'_>) -> Option<String> {
+fn moments_table(numbers: &Numbers, finding: &Finding<'_>) -> Option<String> {
     let columns = ["Quantity", "Value", "95 % interval", "What it is"];
     let name = "Quantities that the moments determine";
     let bulk = with_unit("√(c₁₁₁₁/ρ)", VELOCITY);
@@ -88,7 +88,7 @@ fn determined(numbers: &Numbers, finding: &Finding<'_>) -> Option<String> {
         return Some(table(name, &columns, &rows));
     }
     let identified = finding.identified?;
-    let of = |heading: String, one: &QuantityEstimate, at: &str, unit| {
+    let row = |heading: String, one: &QuantityEstimate, at: &str, unit| {
         let place = format!("{}/identified/{at}", finding.place);
         let known = one.ends().is_some();
         let precision = one.ends().map_or(Precision::Free, width_precision);
@@ -107,17 +107,17 @@ fn determined(numbers: &Numbers, finding: &Finding<'_>) -> Option<String> {
         ]
     };
     let rows = [
-        of(bulk, &identified.bulk_velocity, "bulk_velocity", VELOCITY),
-        of(dispersion, &identified.dispersion, "dispersion", NUMBER),
+        row(bulk, &identified.bulk_velocity, "bulk_velocity", VELOCITY),
+        row(dispersion, &identified.dispersion, "dispersion", NUMBER),
     ];
     Some(table(name, &columns, &rows))
 }
 
 fn parameters(numbers: &Numbers, finding: &Finding<'_>) -> String {
-    let given = |parameter: &Parameter| finding.value(*parameter).0.is_some();
+    let has_value = |parameter: &Parameter| finding.value(*parameter).0.is_some();
     let rows: Vec<Vec<String>> = Parameter::ALL
         .into_iter()
-        .filter(given)
+        .filter(has_value)
         .map(|parameter| parameter_row(numbers, finding, parameter))
         .collect();
     if rows.is_empty() {
@@ -202,5 +202,5 @@ fn why_unknown(finding: &Finding<'_>, parameter: Parameter) -> &'static str {
 
 /// Returns a name with its unit, as HTML.
 fn with_unit(name: &str, unit: Unit) -> String {
-    escaped(&unit.after(name))
+    escape(&unit.axis_label(name))
 }

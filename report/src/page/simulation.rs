@@ -17,7 +17,7 @@ pub(super) fn table(numbers: &Numbers, result: &Simulation) -> String {
     ]];
     let mut add = |name: &str, value: Option<f64>, place: &str, unit: Unit| {
         let shown = numbers.number(value, place, unit, digits(5));
-        rows.push(vec![unit.after(name), shown]);
+        rows.push(vec![unit.axis_label(name), shown]);
     };
     for (place, name) in ["velocity from the first source", "velocity from the second source"]
         .into_iter()
@@ -36,11 +36,11 @@ pub(super) fn table(numbers: &Numbers, result: &Simulation) -> String {
     }
     let waves = &result.guided_waves;
     for (name, wave, at) in [("A0", waves.a0, "a0"), ("S0", waves.s0, "s0")] {
-        let of = |which: &str| format!("/guided_waves/{at}/{which}_velocity");
+        let place = |which: &str| format!("/guided_waves/{at}/{which}_velocity");
         let phase = wave.map(|wave| wave.phase_velocity);
-        add(&format!("phase velocity of {name}"), phase, &of("phase"), VELOCITY);
+        add(&format!("phase velocity of {name}"), phase, &place("phase"), VELOCITY);
         let group = wave.map(|wave| wave.group_velocity);
-        add(&format!("group velocity of {name}"), group, &of("group"), VELOCITY);
+        add(&format!("group velocity of {name}"), group, &place("group"), VELOCITY);
     }
     let mut out = markup_table("Velocity and other observables", &["Quantity", "Value"], &rows);
     let receivers: Vec<Vec<String>> = result

@@ -7,7 +7,7 @@ use osteon_common::results::Status;
 use crate::finding::Finding;
 use crate::input::{ReportedRun, RunContent};
 use crate::number::digits;
-use crate::text::escaped;
+use crate::text::escape;
 
 /// Largest share of failed realizations that is no reason for doubt.
 const FAILED_MAX: f64 = 0.001;
@@ -37,7 +37,7 @@ fn verdict(bearing: Bearing, subject: &'static str, words: impl Into<String>) ->
 }
 
 /// Returns a sentence on the whole, and a list of what it rests on.
-pub(super) fn of_run(run: &ReportedRun, findings: &[Finding<'_>]) -> String {
+pub(super) fn trust_list(run: &ReportedRun, findings: &[Finding<'_>]) -> String {
     if let RunContent::Simulation(result, _) = &run.content {
         let one = match (&result.velocity, &result.failure) {
             (Some(_), _) => verdict(Bearing::Good, "Velocity", "A first arrival was picked."),
@@ -47,22 +47,22 @@ pub(super) fn of_run(run: &ReportedRun, findings: &[Finding<'_>]) -> String {
                 verdict(Bearing::Bad, "Velocity", format!("There is none ({kind}): {detail}."))
             }
         };
-        return list(&[one]);
+        return summary_and_items(&[one]);
     }
     if findings.len() > 1 || findings.iter().any(|finding| finding.group.is_some()) {
-        let hosts: Vec<Verdict> = hosts(run).into_iter().collect();
-        let above = if hosts.is_empty() { String::new() } else { list(&hosts) };
-        return above + &of_groups(findings);
+        let hosts: Vec<Verdict> = hosts_verdict(run).into_iter().collect();
+        let above = if hosts.is_empty() { String::new() } else { summary_and_items(&hosts) };
+        return above + &group_doubts(findings);
     }
-    let of_findings = findings.iter().flat_map(of_finding);
-    let verdicts: Vec<Verdict> = hosts(run).into_iter().chain(of_findings).collect();
-    list(&verdicts)
+    let of_findings = findings.iter().flat_map(finding_verdicts);
+    let verdicts: Vec<Verdict> = hosts_verdict(run).into_iter().chain(of_findings).collect();
+    summary_and_items(&verdicts)
 }
 
-fn of_groups(findings: &[Finding<'_>]) -> String {
+fn group_doubts(findings: &[Finding<'_>]) -> String {
     let mut out = String::new();
     let worst =
-        |finding: &Finding<'_>| of_finding(finding).iter().map(|one| one.bearing as u8).max();
+        |finding: &Finding<'_>| finding_verdicts(finding).iter().map(|one| one.bearing as u8).max();
     let without_doubt = findings.iter().filter(|one| worst(one) == Some(0)).count();
     let sentence = if without_doubt == findings.len() {
         format!("Nothing found here speaks against the results of the {without_doubt} groups.")
@@ -74,31 +74,34 @@ fn of_groups(findings: &[Finding<'_>]) -> String {
     };
     out.push_str(&format!("<p class=\"trust\">{sentence}</p>"));
     for finding in findings {
-        let doubts: Vec<Verdict> =
-            of_finding(finding).into_iter().filter(|one| one.bearing != Bearing::Good).collect();
+        let doubts: Vec<Verdict> = finding_verdicts(finding)
+            .into_iter()
+            .filter(|one| one.bearing != Bearing::Good)
+            .collect();
         if !doubts.is_empty() {
-            let name = escaped(finding.group.unwrap_or_default());
+            let name = escape(finding.group.unwrap_or_default());
             let _infallible = write!(out, "<h3>{name}</h3>{}", items(&doubts));
         }
     }
     out
 }
 
-fn list(verdicts: &[Verdict]) -> String {
-    let of = |bearing| verdicts.iter().filter(|one| one.bearing == bearing).collect::<Vec<_>>();
-    let (bad, caution) = (of(Bearing::Bad), of(Bearing::Caution));
-    let named = |some: &[&Verdict]| {
+fn summary_and_items(verdicts: &[Verdict]) -> String {
+    let with_bearing =
+        |bearing| verdicts.iter().filter(|one| one.bearing == bearing).collect::<Vec<_>>();
+    let (bad, caution) = (with_bearing(Bearing::Bad), with_bearing(Bearing::Caution));
+    let subjects = |some: &[&Verdict]| {
         let subjects = some.iter().map(|one| one.subject.to_lowercase());
         subjects.collect::<Vec<_>>().join(", ")
     };
     let sentence = match (bad.is_empty(), caution.is_empty()) {
         (true, true) => "Nothing found here speaks against this result.".to_owned(),
         (true, false) => {
-            format!("This result can be used with care; look first at: {}.", named(&caution))
+            format!("This result can be used with care; look first at: {}.", subjects(&caution))
         }
-        _ => format!("Do not use this result without looking at: {}.", named(&bad)),
+        _ => format!("Do not use this result without looking at: {}.", subjects(&bad)),
     };
-    format!("<p class=\"trust\">{}</p>{}", escaped(&sentence), items(verdicts))
+    format!("<p class=\"trust\">{}</p>{}", escape(&sentence), items(verdicts))
 }
 
 fn items(verdicts: &[Verdict]) -> String {
@@ -109,7 +112,7 @@ fn items(verdicts: &[Verdict]) -> String {
             Bearing::Caution => ("caution", "take care"),
             Bearing::Bad => ("bad", "problem"),
         };
-        let words = escaped(words);
+        let words = escape(words);
         let _infallible = write!(
             out,
             "<li class=\"{class}\"><strong>{subject}</strong> <span class=\"mark\">{mark}</span> {words}</li>"
@@ -119,23 +122,23 @@ fn items(verdicts: &[Verdict]) -> String {
     out
 }
 
-fn of_finding(finding: &Finding<'_>) -> Vec<Verdict> {
+fn finding_verdicts(finding: &Finding<'_>) -> Vec<Verdict> {
     let mut found = Vec::new();
-    found.extend(status(finding));
-    found.extend(matched(finding));
-    found.extend(determined(finding));
-    found.extend(posterior(finding));
-    found.extend(distribution(finding));
-    found.extend(starts(finding));
-    found.push(failures(finding));
-    found.extend(data(finding));
-    found.extend(few(finding));
-    found.extend(solver(finding));
+    found.extend(status_verdict(finding));
+    found.extend(match_verdict(finding));
+    found.extend(parameters_verdict(finding));
+    found.extend(posterior_verdict(finding));
+    found.extend(distribution_verdict(finding));
+    found.extend(starts_verdict(finding));
+    found.push(failures_verdict(finding));
+    found.extend(outliers_verdict(finding));
+    found.extend(few_data_verdict(finding));
+    found.extend(solver_verdict(finding));
     found
 }
 
 /// Says whether a host that computed a part of the result was banned after the job had ended.
-fn hosts(run: &ReportedRun) -> Option<Verdict> {
+fn hosts_verdict(run: &ReportedRun) -> Option<Verdict> {
     let found = match &run.content {
         RunContent::Identification(result, _) => result.integrity.as_ref()?,
         RunContent::Propagation(result, _) => result.integrity.as_ref()?,
@@ -149,7 +152,7 @@ fn hosts(run: &ReportedRun) -> Option<Verdict> {
     Some(verdict(bearing, "Hosts", format!("{}.", found.statement)))
 }
 
-fn status(finding: &Finding<'_>) -> Option<Verdict> {
+fn status_verdict(finding: &Finding<'_>) -> Option<Verdict> {
     let (bearing, words) = match finding.status? {
         Status::Converged => (Bearing::Good, "It has converged."),
         Status::NotMatched => (Bearing::Bad, "It has ended, but its best point misses the data."),
@@ -166,7 +169,7 @@ fn status(finding: &Finding<'_>) -> Option<Verdict> {
     Some(verdict(bearing, "Search", format!("{words}{}", reason.unwrap_or_default())))
 }
 
-fn matched(finding: &Finding<'_>) -> Option<Verdict> {
+fn match_verdict(finding: &Finding<'_>) -> Option<Verdict> {
     let identified = finding.identified?;
     let noise = match finding.below_noise_from {
         Some(from) => format!(
@@ -184,9 +187,9 @@ fn matched(finding: &Finding<'_>) -> Option<Verdict> {
     })
 }
 
-fn determined(finding: &Finding<'_>) -> Option<Verdict> {
+fn parameters_verdict(finding: &Finding<'_>) -> Option<Verdict> {
     let identified = finding.identified?;
-    let (free, open) = (finding.free().len(), identified.free_directions.len());
+    let (free, open) = (finding.free_parameters().len(), identified.free_directions.len());
     if open == 0 {
         let words = match free {
             1 => "The data determine the free parameter.".to_owned(),
@@ -208,7 +211,7 @@ fn determined(finding: &Finding<'_>) -> Option<Verdict> {
     Some(verdict(Bearing::Caution, "Parameters", words))
 }
 
-fn posterior(finding: &Finding<'_>) -> Option<Verdict> {
+fn posterior_verdict(finding: &Finding<'_>) -> Option<Verdict> {
     let posterior = finding.posterior?;
     Some(if posterior.converged {
         let draws = posterior.effective_draws.unwrap_or(0.0);
@@ -220,7 +223,7 @@ fn posterior(finding: &Finding<'_>) -> Option<Verdict> {
     })
 }
 
-fn distribution(finding: &Finding<'_>) -> Option<Verdict> {
+fn distribution_verdict(finding: &Finding<'_>) -> Option<Verdict> {
     let p_value = match finding.posterior.and_then(|found| found.predictive_p_value) {
         Some(p_value) => p_value,
         None => finding.data?.kolmogorov.flatten()?.p_value,
@@ -240,7 +243,7 @@ fn distribution(finding: &Finding<'_>) -> Option<Verdict> {
     })
 }
 
-fn starts(finding: &Finding<'_>) -> Option<Verdict> {
+fn starts_verdict(finding: &Finding<'_>) -> Option<Verdict> {
     let solutions = finding.solutions?;
     let (matching, all) = (solutions.matching, solutions.points.len());
     let words = format!("{matching} of {all} starts end at a point that matches the data.");
@@ -248,8 +251,8 @@ fn starts(finding: &Finding<'_>) -> Option<Verdict> {
     Some(verdict(bearing, "Starts", words))
 }
 
-fn failures(finding: &Finding<'_>) -> Verdict {
-    let (failed, all) = (finding.failed(), finding.realizations);
+fn failures_verdict(finding: &Finding<'_>) -> Verdict {
+    let (failed, all) = (finding.failed_realizations(), finding.realizations);
     if failed == 0 {
         return verdict(Bearing::Good, "Failures", format!("None of {all} realizations failed."));
     }
@@ -262,7 +265,7 @@ fn failures(finding: &Finding<'_>) -> Verdict {
     verdict(bearing, "Failures", words)
 }
 
-fn data(finding: &Finding<'_>) -> Option<Verdict> {
+fn outliers_verdict(finding: &Finding<'_>) -> Option<Verdict> {
     let data = finding.data?;
     let count = data.outlier_count?;
     let words = format!(
@@ -273,7 +276,7 @@ fn data(finding: &Finding<'_>) -> Option<Verdict> {
 }
 
 /// Finds that there is no interval although the data determine every parameter.
-fn few(finding: &Finding<'_>) -> Option<Verdict> {
+fn few_data_verdict(finding: &Finding<'_>) -> Option<Verdict> {
     let identified = finding.identified?;
     let known = finding.posterior.is_some() || identified.bulk_velocity.ends().is_some();
     if known || !identified.matched || !identified.free_directions.is_empty() {
@@ -284,7 +287,7 @@ fn few(finding: &Finding<'_>) -> Option<Verdict> {
     Some(verdict(Bearing::Caution, "Number of data", words))
 }
 
-fn solver(finding: &Finding<'_>) -> Option<Verdict> {
+fn solver_verdict(finding: &Finding<'_>) -> Option<Verdict> {
     use osteon_files::report::Solver;
     let result = finding.solver?;
     let (Solver::Exact { estimated_error, .. } | Solver::Hybrid { estimated_error, .. }) = result;

@@ -1,8 +1,8 @@
-//! Attenuated materials as ones without attenuation at another complex frequency.
+//! Replaces attenuated materials by ones without attenuation at another complex frequency.
 //!
-//! If all moduli of a material are multiplied by m(s), its equations are those without attenuation,
-//! divided by m, with s/√m in place of s: the wavenumbers are the same, and tractions are m times
-//! theirs.
+//! Attenuation multiplies all moduli of a material by m(s). Its equations, divided by m, are those
+//! without attenuation at s/√m in place of s. So both have the same wavenumbers, and with attenuation
+//! the tractions are m times as large.
 
 use std::f64::consts::TAU;
 
@@ -11,8 +11,8 @@ use osteon_common::layers::Layers;
 
 use crate::complex::Complex;
 
-/// For one complex frequency s, the complex frequencies at which the layers without attenuation have
-/// the waves that they have with it at s.
+/// The complex frequencies at which layers without attenuation have the waves that the attenuated ones
+/// have at one complex frequency s.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LosslessFrequencies {
     /// s/√m(s) of the coupling, 1/s.
@@ -26,7 +26,7 @@ pub(crate) struct LosslessFrequencies {
 }
 
 impl LosslessFrequencies {
-    /// Computes them at `s` (1/s, real part above 0).
+    /// Computes the frequencies for `s` (1/s, real part above 0).
     pub(crate) fn at(layers: &Layers, s: Complex) -> Self {
         let bone = lossless(&layers.bone_attenuation, s);
         let bone_compliance = match layers.bone_attenuation.quality_factor {

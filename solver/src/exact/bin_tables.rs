@@ -24,10 +24,10 @@ const OTHER_TAPERS: [(f64, f64); LANES] = [
     (0.9, 1.0),
     (0.95, 1.0),
 ];
-/// Parts of the other tapers in the own one of a quick or plain grade, the rest of which is the smooth
-/// one: this weighs the upper end of the band more, and so makes up for some of what lies beyond it.
-/// Fitted to the errors of the usual geometry at dispersions of 0.1 to 0.6 and with a plate of 1 mm,
-/// whose largest 1 % become 10 to 30 % smaller by it.
+/// The taper of a quick or plain grade is a mixture: these parts of the other tapers, and the smooth one
+/// for the rest. It weighs the upper end of the band more, and so makes up for some of what lies beyond.
+/// Fitted to the errors of the usual geometry at dispersions of 0.1 to 0.6 and with a plate of 1 mm:
+/// the largest 1 % of them become 10 to 30 % smaller.
 const TAPER_PARTS: [f64; LANES] = [-0.1, 0.39, -0.47, -0.3, -0.39, 0.33, 0.24, 0.74];
 
 /// Tables of one speed bin, shared by all bones.

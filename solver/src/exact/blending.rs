@@ -1,4 +1,4 @@
-//! One result of two passes for one bone.
+//! Makes one result of those of two passes for one bone.
 
 use osteon_common::outcome::FailureKind;
 
@@ -11,7 +11,7 @@ use crate::picking::{self, Pick};
 const SAME_EXTREMUM: f64 = 0.05;
 
 /// Blends the results of two passes for one bone; `weight` is that of the second.
-pub(super) fn merged(
+pub(super) fn merge(
     prepared: &PreparedSetup,
     first: Result<Estimated, Failure>,
     second: Result<Estimated, Failure>,
@@ -19,15 +19,15 @@ pub(super) fn merged(
 ) -> Result<Estimated, Failure> {
     match (first, second) {
         (Ok(first), Ok(second)) if weight < 1.0 && same_extremum(prepared, &first, &second) => {
-            blended(prepared, &first, &second, weight)
+            blend_picks(prepared, &first, &second, weight)
         }
         (_, second) => second,
     }
 }
 
-/// Same as [`merged`], unless the second pass exceeds the limit of the computation: then the
-/// first result is kept, with its error.
-pub(super) fn merged_if_possible(
+/// As [`merge`], but keeps the first result, with its error, if the second pass would exceed the limit
+/// of the computation.
+pub(super) fn merge_if_computed(
     prepared: &PreparedSetup,
     first: Result<Estimated, Failure>,
     second: Result<Estimated, Failure>,
@@ -35,7 +35,7 @@ pub(super) fn merged_if_possible(
 ) -> Result<Estimated, Failure> {
     match second {
         Err(Failure { kind: FailureKind::NoConvergence, .. }) => first,
-        second => merged(prepared, first, second, weight),
+        second => merge(prepared, first, second, weight),
     }
 }
 
@@ -44,7 +44,7 @@ fn same_extremum(prepared: &PreparedSetup, first: &Estimated, second: &Estimated
     first.pick.times.iter().zip(&second.pick.times).all(|(a, b)| (a - b).abs() <= most)
 }
 
-fn blended(
+fn blend_picks(
     prepared: &PreparedSetup,
     first: &Estimated,
     second: &Estimated,

@@ -4,8 +4,8 @@ use crate::arrival::{Arrival, PassSummary, Sampled};
 use crate::failure::Failure;
 use crate::picking::Pick;
 
-/// Ratio of the stated error of a wider band to that of a first one with the same changes: bones that
-/// need a wider band converge more slowly.
+/// Ratio of the stated error in a wider band to that in a first band whose tapers change the velocity
+/// as much: bones that need a wider band converge more slowly.
 const WIDER_FACTOR: f64 = 1.35;
 /// Ratio of the least stated error to the change of the velocity by doubling the band.
 const CHANGE_FACTOR: f64 = 0.45;
@@ -23,18 +23,18 @@ pub(crate) struct Estimated {
 
 impl Estimated {
     pub(crate) fn error(&self) -> f64 {
-        at_most_one(together(self.band_error, self.sampling_error))
+        limit_to_one(root_sum_square(self.band_error, self.sampling_error))
     }
 
-    /// States the larger errors of a wider band, and no less than a part of the change from the pass
-    /// with the next narrower one.
-    pub(crate) fn after(self, narrower: &Result<Self, Failure>) -> Self {
+    /// Enlarges the errors of a pass in a wider band by [`WIDER_FACTOR`]. The band's error is at least
+    /// a part of the change since the pass in the next narrower band.
+    pub(crate) fn widen_errors(self, narrower: &Result<Self, Failure>) -> Self {
         let change = narrower
             .as_ref()
             .map_or(0.0, |narrower| (self.pick.velocity / narrower.pick.velocity - 1.0).abs());
         Self {
-            band_error: at_most_one((WIDER_FACTOR * self.band_error).max(CHANGE_FACTOR * change)),
-            sampling_error: at_most_one(WIDER_FACTOR * self.sampling_error),
+            band_error: limit_to_one((WIDER_FACTOR * self.band_error).max(CHANGE_FACTOR * change)),
+            sampling_error: limit_to_one(WIDER_FACTOR * self.sampling_error),
             ..self
         }
     }
@@ -55,11 +55,12 @@ impl Estimated {
 }
 
 /// Returns the root of the sum of the squares of two errors.
-pub(super) fn together(one: f64, other: f64) -> f64 {
+pub(super) fn root_sum_square(one: f64, other: f64) -> f64 {
     one.mul_add(one, other * other).sqrt()
 }
 
-/// Returns an error; a signal that changes beyond recognition has the largest, not a failure.
-pub(super) fn at_most_one(error: f64) -> f64 {
+/// Returns an error, at most 1, and 1 for NaN: a signal that changes beyond recognition has the largest
+/// error, and does not fail.
+pub(super) fn limit_to_one(error: f64) -> f64 {
     if error <= 1.0 { error } else { 1.0 }
 }

@@ -8,8 +8,8 @@ use osteon_common::sampling::{self, Grade, OuterFaces};
 use crate::exact::table_cache::TableCache;
 use crate::exact::table_memory::TableMemory;
 
-/// Factor of the refinement in the last passes, at refinement 1 and below.
-const LAST_REFINEMENT: f64 = 4.0;
+/// Factor of the refinement in the passes of the full grade, at refinement 1 and below.
+const FULL_REFINEMENT: f64 = 4.0;
 
 /// The tables of every grade.
 #[derive(Debug)]
@@ -24,7 +24,7 @@ impl GradeCaches {
     pub(super) fn new(setup: &Setup, faces: OuterFaces, memory: &Arc<TableMemory>) -> Self {
         let mut refined = *setup;
         if sampling::first_grade(setup) != Grade::Thorough {
-            refined.solver.refinement *= LAST_REFINEMENT;
+            refined.solver.refinement *= FULL_REFINEMENT;
         }
         Self {
             quick: TableCache::new(setup, Grade::Quick, faces, memory),

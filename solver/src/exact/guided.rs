@@ -42,7 +42,7 @@ const GROUP_STEP: f64 = 1e-4;
 /// which is their fourth power, or of extension, their square.
 const THINNEST_FLEXURAL: f64 = 1e-2;
 const THINNEST_EXTENSIONAL: f64 = 1e-5;
-/// Where a count is undecided (a pivot is exactly zero), it is made this much farther.
+/// If a count is undecided because a pivot is exactly zero, it is repeated at the wavenumber times this.
 const BESIDE: f64 = 1.0 + 1e-13;
 
 /// One guided wave at one frequency.
@@ -215,7 +215,7 @@ impl FreePlate<'_> {
             }
             low = high;
         }
-        let k = halved((low, high), |k| Some(self.count(family, k, omega)? < rank))?;
+        let k = bisect((low, high), |k| Some(self.count(family, k, omega)? < rank))?;
         if k * self.thickness < thinnest {
             return None;
         }
@@ -223,7 +223,7 @@ impl FreePlate<'_> {
         let reach = 2.0 * self.medium.fastest * step;
         let mut at = |k: f64| {
             let range = (omega - reach, omega + reach);
-            halved(range, |omega| Some(self.count(family, k, omega)? >= rank))
+            bisect(range, |omega| Some(self.count(family, k, omega)? >= rank))
         };
         let difference = at(k + step)? - at(k - step)?;
         Some(GuidedWave { phase_velocity: omega / k, group_velocity: difference / (2.0 * step) })
@@ -239,7 +239,7 @@ impl FreePlate<'_> {
 }
 
 /// Returns where a condition begins to hold, by halving a range at the end of which it holds.
-fn halved(
+fn bisect(
     (mut low, mut high): (f64, f64),
     mut holds: impl FnMut(f64) -> Option<bool>,
 ) -> Option<f64> {
@@ -278,11 +278,11 @@ impl Kernel for CountWaves<'_> {
         for _ in 1..doublings {
             let joint = negative_pivots(joint_matrix(&layer.joint()), &family.components)?;
             clamped = clamped.checked_mul(2)?.checked_add(joint)?;
-            layer = layer.doubled();
+            layer = layer.double();
         }
         let middle = negative_pivots(joint_matrix(&layer.joint()), &family.middle)?;
         clamped = clamped.checked_mul(family.copies)?.checked_add(middle)?;
-        let faces = negative_pivots(face_matrix(&layer.doubled()), &family.faces)?;
+        let faces = negative_pivots(face_matrix(&layer.double()), &family.faces)?;
         clamped.checked_add(faces)
     }
 }
@@ -292,7 +292,7 @@ type Real = [[f64; FACES]; FACES];
 
 /// Returns the first lane of a number.
 #[inline(always)]
-fn first<V: Vector>(value: ComplexVector<V>) -> Complex {
+fn first_lane<V: Vector>(value: ComplexVector<V>) -> Complex {
     let (mut re, mut im) = (Lanes::ZERO, Lanes::ZERO);
     value.re.store(&mut re, 0);
     value.im.store(&mut im, 0);
@@ -305,7 +305,7 @@ fn joint_matrix<V: Vector>(joint: &Symmetric<V>) -> Real {
     let mut matrix = [[0.0; FACES]; FACES];
     for i in 0..3 {
         for j in 0..3 {
-            matrix[i][j] = first(joint[symmetric_entry(i, j)]).re;
+            matrix[i][j] = first_lane(joint[symmetric_entry(i, j)]).re;
         }
     }
     matrix
@@ -322,8 +322,8 @@ fn face_matrix<V: Vector>(layer: &Layer<V>) -> Real {
     let mut matrix = [[0.0; FACES]; FACES];
     for i in 0..3 {
         for j in 0..3 {
-            let top = first(layer.top[3 * i + j]);
-            let down = first(layer.down[symmetric_entry(i, j)]);
+            let top = first_lane(layer.top[3 * i + j]);
+            let down = first_lane(layer.down[symmetric_entry(i, j)]);
             matrix[i][j] = top.re - down.re;
             matrix[i + 3][j + 3] = top.re + down.re;
             matrix[i][j + 3] = -(top.im + down.im);

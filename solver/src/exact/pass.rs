@@ -1,11 +1,11 @@
-//! One pass: extrema of the signals in one band, the pick, and the estimate of its error.
+//! One pass in one band: the extrema of the signals, the pick among them, and the estimate of its error.
 
 use osteon_common::case::Setup;
 use osteon_common::probe::Place;
 use osteon_common::sampling;
 
 use crate::exact::bin_tables::{Band, BinTables};
-use crate::exact::estimated::{Estimated, at_most_one, together};
+use crate::exact::estimated::{Estimated, limit_to_one, root_sum_square};
 use crate::exact::plate::{AccuratePlate, FastPlate};
 use crate::exact::prepared_setup::PreparedSetup;
 use crate::exact::response::Spectra;
@@ -17,23 +17,23 @@ use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::picking::{self, Pick, Window, pick};
 use crate::vector::Vector;
 
-/// Ratio of the stated error to the root mean square change of the velocity by the other tapers: 99 of
-/// 100 errors are smaller.
+/// Ratio of the stated error of a band to the root mean square change of the velocity when the band is
+/// cut by other tapers. Of 100 errors, 99 are smaller than stated.
 const BAND_FACTOR: f64 = 4.9;
-/// Largest further factor of thin plates and heavy marrows.
+/// Largest [`slow_decay_factor`].
 const SLOW_DECAY_MAX: f64 = 2.0;
-/// Density of the marrow, kg/m³, above which the further factor grows.
+/// Density of the marrow, kg/m³, above which [`slow_decay_factor`] grows.
 const HEAVY_MARROW: f64 = 2000.0;
-/// Number of times before the earliest possible arrival, spread over one period, at which the signal
-/// is looked at.
-const BEFORE: usize = LANES - 1;
-/// Ratio of the stated error to the root mean square change of the velocity by the noise before the
-/// earliest possible arrival, as receivers have it at the same time.
+/// Number of times at which the noise is read, spread over one period before the earliest possible
+/// arrival.
+const NOISE_TIMES: usize = LANES - 1;
+/// Ratio of the stated error of a sampling to the root mean square change of the velocity by the noise
+/// that all receivers have at the same time before their earliest possible arrivals.
 const NOISE_FACTOR: f64 = 4.6;
-/// The same for noise that shifts the times in the least favourable way.
+/// The same ratio, for noise that shifts the receivers' times in the least favourable way.
 const WORST_NOISE_FACTOR: f64 = 0.75;
-/// Rate at which noise grows from where it is looked at to the pick, relative to the damping, where a
-/// layer is attenuated: what the sums leave out is then larger compared with the arrival.
+/// Rate at which noise is assumed to grow from where it is read to the pick, relative to the damping, if
+/// a layer is attenuated: what the sums leave out is then larger compared with the arrival.
 const NOISE_GROWTH: f64 = 0.9;
 
 /// Scratch memory of one thread; its contents never reach a result.
@@ -48,7 +48,7 @@ pub(crate) struct ExactWorkspace {
     tapered: Vec<ComplexLanes>,
 }
 
-/// Stores the extrema of the signals of its spectra in the workspace.
+/// Finds the extrema of the signals whose spectra are in the workspace, and keeps them there.
 ///
 /// # Errors
 /// If a number is not finite.
@@ -71,7 +71,7 @@ pub(super) fn observe(
 ///
 /// # Errors
 /// If there is no acceptable pick.
-pub(super) fn picked(
+pub(super) fn pick_with_error(
     prepared: &PreparedSetup,
     bin: &BinTables,
     band: &Band,
@@ -84,21 +84,21 @@ pub(super) fn picked(
         let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();
         picking::slope(&prepared.distances, &times) / pick.velocity - 1.0
     });
-    let band_error = BAND_FACTOR * slow_decay(&prepared.setup) * root_mean_square(&changes);
+    let band_error = BAND_FACTOR * slow_decay_factor(&prepared.setup) * root_mean_square(&changes);
     let sampling_error = sampling_error(prepared, bin, band, &pick, workspace);
     Ok(Estimated {
         pick,
-        band_error: at_most_one(band_error),
-        sampling_error: at_most_one(sampling_error),
+        band_error: limit_to_one(band_error),
+        sampling_error: limit_to_one(sampling_error),
         sampled: band.sampled,
     })
 }
 
 /// Estimates the error that is due to the distances of samples and the ends of their sums.
 ///
-/// Before the earliest possible arrival the pressure is zero, except for waves that wrap round
-/// and for what the sums leave out. That noise goes on: its slope, divided by the curvature of the
-/// picked extremum, is the error of a time.
+/// Before the earliest possible arrival the true pressure is zero. What is computed there is noise:
+/// waves that wrap round, and what the sums leave out. The noise continues under the arrival, and its
+/// slope, divided by the curvature of the picked extremum, is the error of a time.
 fn sampling_error(
     prepared: &PreparedSetup,
     bin: &BinTables,
@@ -107,10 +107,10 @@ fn sampling_error(
     workspace: &ExactWorkspace,
 ) -> f64 {
     let PreparedSetup { setup, places, isa, .. } = prepared;
-    let delays = isa.run(Listen { setup, places, bin, band, times: &pick.times, workspace });
+    let delays = isa.run(ReadNoise { setup, places, bin, band, times: &pick.times, workspace });
     let mean = picking::mean(&pick.times);
     let spread = pick.times.iter().fold(0.0, |sum, t| (t - mean).mul_add(t - mean, sum));
-    let (mut changes, mut worst) = ([0.0; BEFORE], 0.0);
+    let (mut changes, mut worst) = ([0.0; NOISE_TIMES], 0.0);
     for (t, delays) in pick.times.iter().zip(&delays) {
         let weight = (t - mean) / spread;
         for (change, &delay) in changes.iter_mut().zip(delays) {
@@ -118,13 +118,12 @@ fn sampling_error(
         }
         worst = root_mean_square(delays).mul_add(weight.abs(), worst);
     }
-    together(NOISE_FACTOR * root_mean_square(&changes), WORST_NOISE_FACTOR * worst)
+    root_sum_square(NOISE_FACTOR * root_mean_square(&changes), WORST_NOISE_FACTOR * worst)
 }
 
-/// Returns the ratio of a band's error to what it would usually be with the same change by the other
-/// tapers: in a thin plate, or on a heavy marrow, the error falls slowly with the band, which tapers do
-/// not show.
-pub(crate) fn slow_decay(setup: &Setup) -> f64 {
+/// Returns the ratio of a band's error to the one that other tapers usually show: in a thin plate, or on
+/// a heavy marrow, the error falls slowly as the band grows, which tapers do not show.
+pub(crate) fn slow_decay_factor(setup: &Setup) -> f64 {
     let heaviness = (setup.layers.marrow.density / HEAVY_MARROW).max(1.0);
     (sampling::thinness(setup) * heaviness).min(SLOW_DECAY_MAX)
 }
@@ -168,7 +167,7 @@ impl Kernel for Observe<'_> {
     }
 }
 
-/// Kernel that finds the times of the same extrema, s, with the spectra cut by each of the other
+/// Kernel that finds the times of the picked extrema, s, when the spectra are cut by each of the other
 /// tapers.
 struct Repick<'a> {
     bin: &'a BinTables,
@@ -193,9 +192,9 @@ impl Kernel for Repick<'_> {
     }
 }
 
-/// Kernel that looks at the signals before the earliest possible arrivals: the times, s, by which what
-/// is there delays the picked extrema.
-struct Listen<'a> {
+/// Kernel that reads the noise before the earliest possible arrivals. Returns the times, s, by which it
+/// delays the picked extrema.
+struct ReadNoise<'a> {
     setup: &'a Setup,
     places: &'a [Place],
     bin: &'a BinTables,
@@ -204,13 +203,13 @@ struct Listen<'a> {
     workspace: &'a ExactWorkspace,
 }
 
-impl Kernel for Listen<'_> {
-    type Output = Vec<[f64; BEFORE]>;
+impl Kernel for ReadNoise<'_> {
+    type Output = Vec<[f64; NOISE_TIMES]>;
 
     #[inline(always)]
-    fn run<V: Vector>(self) -> Vec<[f64; BEFORE]> {
+    fn run<V: Vector>(self) -> Vec<[f64; NOISE_TIMES]> {
         let Tables { sampling, runs, .. } = &self.bin.tables;
-        let step = 1.0 / (BEFORE as f64 * self.setup.probe.center_frequency);
+        let step = 1.0 / (NOISE_TIMES as f64 * self.setup.probe.center_frequency);
         let is_attenuated = self.setup.layers.attenuated().is_some();
         let growth = if is_attenuated { NOISE_GROWTH * sampling.damping } else { 0.0 };
         let mut delays = Vec::with_capacity(self.times.len());
@@ -220,11 +219,11 @@ impl Kernel for Listen<'_> {
             let earliest = sampling::earliest_arrival(self.setup, place, sampling.speed);
             // The last time is that of the pick.
             let mut times = Lanes([time; LANES]);
-            for (i, t) in times.0[..BEFORE].iter_mut().enumerate() {
+            for (i, t) in times.0[..NOISE_TIMES].iter_mut().enumerate() {
                 *t = (i as f64 + 0.5).mul_add(-step, earliest);
             }
             let (slopes, curvatures) = signal.bends::<V>(&times, &self.band.taper);
-            let delay = |i: usize| slopes.0[i] / curvatures.0[BEFORE];
+            let delay = |i: usize| slopes.0[i] / curvatures.0[NOISE_TIMES];
             delays.push(std::array::from_fn(|i| match growth {
                 0.0 => delay(i),
                 growth => delay(i) * libm::exp(growth * (time - times.0[i])),

@@ -1,4 +1,4 @@
-//! The passes for one bone: which samplings and bands it needs, and in which order.
+//! The passes for one bone: which grades of sampling and which bands it needs, and in which order.
 
 use std::ops::Range;
 
@@ -18,8 +18,8 @@ use crate::exact::weights::{self, LARGE_ERROR, VERY_LARGE_ERROR, rise};
 use crate::failure::Failure;
 use crate::medium::Medium;
 
-/// Number of thorough passes without an arrival after which there is none. (Of a quick grade, one
-/// leads to the thorough grade.)
+/// Number of thorough passes that find no arrival before the bone is said to have none. (A single quick
+/// or plain one leads to the thorough grade.)
 const THOROUGH_ATTEMPTS: usize = 2;
 
 /// State of the passes for one bone.
@@ -39,8 +39,8 @@ pub(super) struct BonePasses<'a> {
 }
 
 impl<'a> BonePasses<'a> {
-    /// Begins with no pass; `speed` is the upper bound of every wave's speed, m/s, and `bin` its speed
-    /// bin.
+    /// Creates the state before the first pass. No wave is faster than `speed` (m/s), and `bin` is the
+    /// index of its speed bin.
     pub(super) fn new(
         prepared: &'a PreparedSetup,
         caches: &'a GradeCaches,
@@ -52,8 +52,9 @@ impl<'a> BonePasses<'a> {
         Self { prepared, caches, medium, speed, bin, workspace, count: 0, pairs: 0 }
     }
 
-    /// Computes as many passes as the bone needs, in its speed bin and, near the edge, in the next.
-    pub(super) fn in_bins(&mut self) -> Result<Estimated, Failure> {
+    /// Makes as many passes as the bone needs in its speed bin. Near the edge of the bin, does the same
+    /// in the next one, and blends both results.
+    pub(super) fn run_in_bins(&mut self) -> Result<Estimated, Failure> {
         let found = self.run();
         let next = sampling::next_bin_weight(&self.prepared.setup, self.bin, self.speed);
         if next == 0.0 {
@@ -62,124 +63,141 @@ impl<'a> BonePasses<'a> {
         self.bin += 1;
         let other = self.run();
         self.bin -= 1;
-        blending::merged_if_possible(self.prepared, found, other, next)
+        blending::merge_if_computed(self.prepared, found, other, next)
     }
 
-    /// Computes as many passes as the bone needs in one speed bin.
+    /// Makes as many passes as the bone needs in one speed bin.
     fn run(&mut self) -> Result<Estimated, Failure> {
         let Self { prepared, caches, .. } = *self;
         if sampling::first_grade(&prepared.setup) == Grade::Thorough {
-            let found = self.thorough(&caches.thorough, LARGE_ERROR.1);
-            return self.completed(found, |found| weights::rough(prepared, found));
+            let found = self.make_thorough_passes(&caches.thorough, LARGE_ERROR.1);
+            return self
+                .complete(found, |found| weights::large_sampling_error_weight(prepared, found));
         }
         let mut thorough = None;
-        let quick = self.quick(&caches.quick);
+        let quick = self.make_quick_passes(&caches.quick);
         let weight =
-            quick.as_ref().map_or(0.0, |found| weights::replaced_by_plain(prepared, found));
-        let plain = (weight > 0.0).then(|| self.plain(&caches.plain));
-        let plain = plain.map(|found| self.checked(found, &mut thorough));
-        // What the plain grade replaces as a whole need not be checked.
-        let quick = if weight < 1.0 { self.checked(quick, &mut thorough) } else { quick };
+            quick.as_ref().map_or(0.0, |found| weights::plain_grade_weight(prepared, found));
+        let plain = (weight > 0.0).then(|| self.make_plain_passes(&caches.plain));
+        let plain = plain.map(|found| self.replace_doubtful(found, &mut thorough));
+        // A quick result that the plain one replaces as a whole needs no thorough passes.
+        let quick = if weight < 1.0 { self.replace_doubtful(quick, &mut thorough) } else { quick };
         match plain {
-            Some(plain) => blending::merged(prepared, quick, plain, weight),
+            Some(plain) => blending::merge(prepared, quick, plain, weight),
             None => quick,
         }
     }
 
-    /// Makes the thorough passes, once for both grades, if the pick of a quick or plain grade is
-    /// unreliable or missing, or if its sampling error, or the whole error after all bands, is large.
-    fn checked(
+    /// Blends a quick or plain result with that of the thorough passes if the pick is unreliable or
+    /// missing, if its sampling error is large, or if its whole error is large after all bands. The
+    /// thorough passes are made once, at the first call, and kept in `thorough`.
+    fn replace_doubtful(
         &mut self,
         found: Result<Estimated, Failure>,
         thorough: &mut Option<Result<Estimated, Failure>>,
     ) -> Result<Estimated, Failure> {
         let Self { prepared, caches, speed, .. } = *self;
         let doubt = |found: &Estimated| {
-            weights::coarse(prepared, found)
-                .max(weights::useless(prepared, found))
-                .max(weights::unreliable(prepared, found, speed))
+            weights::very_large_sampling_error_weight(prepared, found)
+                .max(weights::useless_error_weight(prepared, found))
+                .max(weights::unreliable_pick_weight(prepared, found, speed))
         };
         let weight = found.as_ref().map_or(1.0, doubt);
         if weight == 0.0 {
             return found;
         }
         let thorough = thorough.get_or_insert_with(|| {
-            let thorough = self.thorough(&caches.thorough, VERY_LARGE_ERROR.1);
-            self.completed(thorough, |found| weights::coarse(prepared, found))
+            let thorough = self.make_thorough_passes(&caches.thorough, VERY_LARGE_ERROR.1);
+            self.complete(thorough, |found| {
+                weights::very_large_sampling_error_weight(prepared, found)
+            })
         });
-        blending::merged(prepared, found, thorough.clone(), weight)
+        blending::merge(prepared, found, thorough.clone(), weight)
     }
 
-    /// Makes the last passes if the weight of the error is not 0.
-    fn completed(
+    /// Blends a thorough result with that of the passes of the full grade, if the weight of these is not
+    /// 0. `full_weight` computes it from the result.
+    fn complete(
         &mut self,
         found: Result<Estimated, Failure>,
-        of_error: impl Fn(&Estimated) -> f64,
+        full_weight: impl Fn(&Estimated) -> f64,
     ) -> Result<Estimated, Failure> {
-        let weight = found.as_ref().map_or(0.0, of_error);
+        let weight = found.as_ref().map_or(0.0, full_weight);
         if weight == 0.0 {
             return found;
         }
-        let full = self.thorough(&self.caches.full, f64::INFINITY);
-        blending::merged_if_possible(self.prepared, found, full, weight)
+        let full = self.make_thorough_passes(&self.caches.full, f64::INFINITY);
+        blending::merge_if_computed(self.prepared, found, full, weight)
     }
 
-    /// Makes the quick passes. Without an arrival, or where the plain grade replaces the result, a wider
-    /// band is not tried.
-    fn quick(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
+    /// Makes the quick passes. No wider band is tried after a pass without an arrival, or if the pick is
+    /// so small that the plain grade replaces the result anyway.
+    fn make_quick_passes(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
         let prepared = self.prepared;
-        self.fast(cache, |found, _| {
-            if weights::small(prepared, found) < 1.0 {
-                weights::inexact(prepared, found)
+        self.make_fast_passes(cache, |found, _| {
+            if weights::small_pick_weight(prepared, found) < 1.0 {
+                weights::large_error_weight(prepared, found)
             } else {
                 0.0
             }
         })
     }
 
-    /// Makes the plain passes. Where the second band has not mended the sampling error, wider ones are
-    /// not tried.
-    fn plain(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
+    /// Makes the plain passes. If the sampling error is still large in the second band, no wider one is
+    /// tried.
+    fn make_plain_passes(&mut self, cache: &TableCache) -> Result<Estimated, Failure> {
         let prepared = self.prepared;
-        self.fast(cache, |found, widened| {
-            let mended = if widened == 0 { 1.0 } else { 1.0 - weights::rough(prepared, found) };
-            mended * weights::inexact(prepared, found)
+        self.make_fast_passes(cache, |found, widened| {
+            let mended = if widened == 0 {
+                1.0
+            } else {
+                1.0 - weights::large_sampling_error_weight(prepared, found)
+            };
+            mended * weights::large_error_weight(prepared, found)
         })
     }
 
-    fn fast(
+    /// Makes the passes of the quick or the plain grade.
+    fn make_fast_passes(
         &mut self,
         cache: &TableCache,
         weight: impl Fn(&Estimated, usize) -> f64,
     ) -> Result<Estimated, Failure> {
         let bin = &*cache.tables(self.bin, self.speed)?;
         self.prepared.fill_plate(self.medium, &mut self.workspace.fast);
-        self.bands(bin, 1, weight, |workspace| (&mut workspace.fast, &mut workspace.spectra))
+        self.make_passes(bin, 1, weight, |workspace| (&mut workspace.fast, &mut workspace.spectra))
     }
 
-    /// Makes the passes of a thorough grade; a sampling error of at least `limit` is left to the next
-    /// grade.
-    fn thorough(&mut self, cache: &TableCache, limit: f64) -> Result<Estimated, Failure> {
+    /// Makes the passes of the thorough or the full grade. No wider band is tried if the sampling error
+    /// is at least `limit`: only the next grade makes that smaller.
+    fn make_thorough_passes(
+        &mut self,
+        cache: &TableCache,
+        limit: f64,
+    ) -> Result<Estimated, Failure> {
         let prepared = self.prepared;
         let bin = &*cache.tables(self.bin, self.speed)?;
         prepared.fill_plate(self.medium, &mut self.workspace.accurate);
         let weight = |found: &Estimated, _| {
-            let is_vain = weights::counted(prepared, found.sampling_error) >= limit;
-            if is_vain {
+            let needs_next_grade =
+                weights::comparable_error(prepared, found.sampling_error) >= limit;
+            if needs_next_grade {
                 0.0
             } else {
-                rise(weights::counted(prepared, found.band_error), LARGE_ERROR)
+                rise(weights::comparable_error(prepared, found.band_error), LARGE_ERROR)
             }
         };
-        self.bands(bin, THOROUGH_ATTEMPTS, weight, |workspace| {
+        self.make_passes(bin, THOROUGH_ATTEMPTS, weight, |workspace| {
             (&mut workspace.accurate, &mut workspace.spectra)
         })
     }
 
-    /// Makes a pass in the first band of a bin, and in wider ones: as long as `weight`, of a result and
-    /// the number of wider bands so far, is not 0, and fewer than `attempts` passes found no arrival.
-    /// `parts` returns the plate to be used, and the spectra.
-    fn bands<const TERMS: usize>(
+    /// Makes a pass in the first band of a bin, then passes in wider ones, and blends their results.
+    ///
+    /// `weight` is that of the next wider band, given the last result and the number of wider bands so
+    /// far; no pass follows if it is 0, or once `attempts` passes have found no arrival. `parts` returns
+    /// the plate and the spectra of a workspace that are used.
+    fn make_passes<const TERMS: usize>(
         &mut self,
         bin: &BinTables,
         attempts: usize,
@@ -194,7 +212,7 @@ impl<'a> BonePasses<'a> {
             spectra.fill(prepared.isa, &bin.tables, passes.medium, plate, lines);
         };
         fill(self, 0..bin.first.lines);
-        let mut last = self.pass(bin, &bin.first);
+        let mut last = self.make_pass(bin, &bin.first);
         let mut lines = bin.first.lines;
         let (mut replaced, mut failed) = (Vec::new(), 0);
         for (widened, band) in bin.wider.iter().enumerate() {
@@ -210,19 +228,20 @@ impl<'a> BonePasses<'a> {
             }
             fill(self, lines..band.lines);
             lines = band.lines;
-            let wider = self.pass(bin, band).map(|wider| wider.after(&last));
+            let wider = self.make_pass(bin, band).map(|wider| wider.widen_errors(&last));
             replaced.push((std::mem::replace(&mut last, wider), weight));
         }
         replaced
             .into_iter()
             .rev()
-            .fold(last, |wider, (found, weight)| blending::merged(prepared, found, wider, weight))
+            .fold(last, |wider, (found, weight)| blending::merge(prepared, found, wider, weight))
     }
 
-    fn pass(&mut self, bin: &BinTables, band: &Band) -> Result<Estimated, Failure> {
+    /// Makes a pass in one band, with the spectra in the workspace.
+    fn make_pass(&mut self, bin: &BinTables, band: &Band) -> Result<Estimated, Failure> {
         self.count += 1;
         pass::observe(self.prepared, self.speed, bin, band, self.workspace)?;
-        pass::picked(self.prepared, bin, band, self.workspace)
+        pass::pick_with_error(self.prepared, bin, band, self.workspace)
     }
 }
 

@@ -141,10 +141,10 @@ impl<const TERMS: usize> Plate<TERMS> {
         };
         let mut layer = sublayer::<TERMS, V>(&self.polynomials, k.mul(V::splat(prepared.sublayer)));
         for _ in 1..prepared.doublings {
-            layer = layer.doubled();
+            layer = layer.double();
         }
         let load = load.scale(V::splat(1.0 / prepared.stiffness));
-        layer.closed(load).scale(V::splat(prepared.stiffness))
+        layer.last_pivot(load).scale(V::splat(prepared.stiffness))
     }
 
     /// Returns the thinnest sublayer at wavenumbers `k` (rad/m), and the number of doublings, at least
@@ -194,12 +194,12 @@ fn products<const TERMS: usize, V: Vector>(
 }
 
 impl<V: Vector> Layer<V> {
-    /// Returns two of these layers, one on the other.
+    /// Puts two of these layers together, one on the other.
     #[inline(always)]
-    pub(crate) fn doubled(&self) -> Self {
+    pub(crate) fn double(&self) -> Self {
         let factor = Factor::new(&self.joint());
         let down = factor.lower.forward(&self.down);
-        let scaled = factor.scaled(&down);
+        let scaled = factor.divide_by_diagonal(&down);
         let new_down = gram(&scaled, &down);
         let up = factor.lower.forward(&self.up);
         let a = &self.top;
@@ -214,7 +214,7 @@ impl<V: Vector> Layer<V> {
             dot_from(a[7], scaled[2], up[1]),
             dot_from(a[8], scaled[2], up[2]),
         ];
-        Self { top, down: new_down, up: gram(&factor.scaled(&up), &up) }
+        Self { top, down: new_down, up: gram(&factor.divide_by_diagonal(&up), &up) }
     }
 
     /// Returns S = A + Aᵀ of the joint between two equal layers.
@@ -234,33 +234,33 @@ impl<V: Vector> Layer<V> {
     /// Returns the last pivot of the elimination of all displacements but u3 of the upper face, for
     /// two of these layers, one on the other, with the lower face loaded by `load`.
     #[inline(always)]
-    fn closed(&self, load: ComplexVector<V>) -> ComplexVector<V> {
+    fn last_pivot(&self, load: ComplexVector<V>) -> ComplexVector<V> {
         let a = &self.top;
         // Lower face: (K_bb + load e3 e3ᵀ) u_bottom = U u_middle.
         let bottom = [a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8].add(load)];
         let [s0, s1, s2, s3, s4, s5] = self.joint();
         let joint = [s0, s1, s2, s1, s3, s4, s2, s4, s5];
-        let middle = self.eliminated(&bottom, &joint);
-        let top = self.eliminated(&middle, &self.top);
+        let middle = self.eliminate(&bottom, &joint);
+        let top = self.eliminate(&middle, &self.top);
         Lu::new(&top).last_pivot
     }
 
     /// Returns target - D pivot⁻¹ U.
     #[inline(always)]
-    fn eliminated(&self, pivot: &Matrix<V>, target: &Matrix<V>) -> Matrix<V> {
+    fn eliminate(&self, pivot: &Matrix<V>, target: &Matrix<V>) -> Matrix<V> {
         let lu = Lu::new(pivot);
         let last = lu.last_pivot.recip();
         let right = lu.lower.forward(&self.up);
         let d = &self.down;
-        let first = lu.divided([d[0], d[1], d[2]], last);
+        let first = lu.divide_row([d[0], d[1], d[2]], last);
         let a = dot_from(target[0], first, right[0]);
         let b = dot_from(target[1], first, right[1]);
         let c = dot_from(target[2], first, right[2]);
-        let second = lu.divided([d[1], d[3], d[4]], last);
+        let second = lu.divide_row([d[1], d[3], d[4]], last);
         let e = dot_from(target[3], second, right[0]);
         let f = dot_from(target[4], second, right[1]);
         let g = dot_from(target[5], second, right[2]);
-        let third = lu.divided([d[2], d[4], d[5]], last);
+        let third = lu.divide_row([d[2], d[4], d[5]], last);
         let h = dot_from(target[6], third, right[0]);
         let i = dot_from(target[7], third, right[1]);
         let j = dot_from(target[8], third, right[2]);
@@ -349,12 +349,16 @@ impl<V: Vector> Factor<V> {
 
     /// Returns the columns of D⁻¹ b.
     #[inline(always)]
-    fn scaled(&self, b: &[[ComplexVector<V>; 3]; 3]) -> [[ComplexVector<V>; 3]; 3] {
-        [self.scaled_column(b[0]), self.scaled_column(b[1]), self.scaled_column(b[2])]
+    fn divide_by_diagonal(&self, b: &[[ComplexVector<V>; 3]; 3]) -> [[ComplexVector<V>; 3]; 3] {
+        [
+            self.divide_column_by_diagonal(b[0]),
+            self.divide_column_by_diagonal(b[1]),
+            self.divide_column_by_diagonal(b[2]),
+        ]
     }
 
     #[inline(always)]
-    fn scaled_column(&self, b: [ComplexVector<V>; 3]) -> [ComplexVector<V>; 3] {
+    fn divide_column_by_diagonal(&self, b: [ComplexVector<V>; 3]) -> [ComplexVector<V>; 3] {
         [b[0].mul(self.inverse[0]), b[1].mul(self.inverse[1]), b[2].mul(self.inverse[2])]
     }
 }
@@ -404,7 +408,11 @@ impl<V: Vector> Lu<V> {
 
     /// Returns the row b U⁻¹; `last` is the inverse of the last pivot.
     #[inline(always)]
-    fn divided(&self, b: [ComplexVector<V>; 3], last: ComplexVector<V>) -> [ComplexVector<V>; 3] {
+    fn divide_row(
+        &self,
+        b: [ComplexVector<V>; 3],
+        last: ComplexVector<V>,
+    ) -> [ComplexVector<V>; 3] {
         let x = b[0].mul(self.inverse[0]);
         let y = x.mul_sub_from(self.u01, b[1]).mul(self.inverse[1]);
         let z = y.mul_sub_from(self.u12, x.mul_sub_from(self.u02, b[2])).mul(last);

@@ -88,7 +88,7 @@ pub(crate) fn respond<const TERMS: usize>(
     responses: &mut Vec<ComplexLanes>,
 ) {
     responses.clear();
-    let kept = tables.kept(line);
+    let kept = tables.kept_line(line);
     let mut scratch = None;
     for b in 0..line.blocks {
         let k = tables.wavenumbers(b);

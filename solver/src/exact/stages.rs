@@ -154,7 +154,7 @@ impl Observed<'_, '_> {
     pub fn picking(&self) -> Result<Arrival, Failure> {
         let Filled { prepared, bin, memory, .. } = &*self.0;
         let band = self.0.band();
-        let found = pass::picked(prepared, bin, band, &memory.exact)?;
+        let found = pass::pick_with_error(prepared, bin, band, &memory.exact)?;
         Ok(found.arrival(1, band.sampled.pairs))
     }
 }

@@ -143,7 +143,7 @@ mod tests {
         let bones: Vec<_> = (0..6).map(|index| ensemble.bone(index).unwrap()).collect();
         let memory = Arc::new(TableMemory::default());
         let expected = bits(&Exact::new(&setup, Isa::fastest(), &memory), &bones);
-        let needed = memory.reserved();
+        let needed = memory.reserved_bytes();
         assert!((1..TABLE_BYTES_MAX).contains(&needed), "{needed}");
         // No bin is kept; some bins and lines are.
         for free in [0, needed / 4, needed / 2] {
@@ -151,7 +151,7 @@ mod tests {
             assert!(memory.reserve(TABLE_BYTES_MAX - free));
             let keeps_few = Exact::new(&setup, Isa::fastest(), &memory);
             assert_eq!(bits(&keeps_few, &bones), expected, "{free} bytes free");
-            assert!(memory.reserved() <= TABLE_BYTES_MAX, "{}", memory.reserved());
+            assert!(memory.reserved_bytes() <= TABLE_BYTES_MAX, "{}", memory.reserved_bytes());
         }
     }
 }

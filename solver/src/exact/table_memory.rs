@@ -22,7 +22,7 @@ impl TableMemory {
 
     /// Returns the memory that is reserved, bytes.
     #[cfg(test)]
-    pub(crate) fn reserved(&self) -> u64 {
+    pub(crate) fn reserved_bytes(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
 }

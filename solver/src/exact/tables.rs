@@ -40,7 +40,6 @@ pub(crate) struct Tables {
 /// The waves that spectra consist of, other than the direct wave and its images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Waves {
-    /// All.
     All,
     /// Those that may arrive before the direct wave: without the mirror wave, which a face without
     /// stiffness in place of the bone would reflect. It is the largest wave near the direct one, and
@@ -55,7 +54,7 @@ struct Heights {
     lowest: f64,
     /// Height of a receiver above the next lower one; 0 if all have one height.
     step: f64,
-    /// Whether receivers are the lower, the larger their number.
+    /// Whether receivers with larger numbers are lower.
     falling: bool,
 }
 
@@ -160,7 +159,7 @@ impl Tables {
     }
 
     /// Returns the contents of a line, empty if they are not kept.
-    pub(crate) fn kept<'a>(&self, line: &'a Line) -> &'a KeptLine {
+    pub(crate) fn kept_line<'a>(&self, line: &'a Line) -> &'a KeptLine {
         line.kept.get_or_init(|| match &self.memory {
             Some(memory) if memory.reserve(line.bytes(&self.sampling, self.is_tilted())) => {
                 line.contents(&self.setup, &self.heights, &self.sampling)

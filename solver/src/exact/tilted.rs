@@ -28,7 +28,7 @@ impl Kernel for SumTilted<'_> {
         let receivers = tables.receivers();
         sums.clear();
         sums.resize(receivers, ComplexLanes::ZERO);
-        let kept = tables.kept(&tables.lines[line]);
+        let kept = tables.kept_line(&tables.lines[line]);
         let mut scratch = None;
         for (b, response) in responses.iter().enumerate() {
             let factors = tables.height_factors(&tables.lines[line], kept, b, &mut scratch);

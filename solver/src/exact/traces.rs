@@ -24,7 +24,7 @@ const PRESSURES_MAX: f64 = 5e6;
 /// is rounded.
 const TO_BE_SAFE: f64 = 1.01;
 
-/// Kernel that computes the pressures at the receivers.
+/// The pressure at every receiver as a function of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traces {
     /// Times, s, from 0 on.
@@ -213,7 +213,7 @@ mod tests {
         let taper = tables.taper(cut);
         spectra.clear(&tables);
         spectra.fill(isa, &tables, &medium, &mut plate, 0..tables.lines.len());
-        let of_receiver = |(r, place)| {
+        let receiver_pressures = |(r, place)| {
             let mut spectrum = spectra.receiver(r).to_vec();
             for (run, weights) in spectrum.iter_mut().zip(&taper) {
                 run.re = run.re * *weights;
@@ -225,7 +225,7 @@ mod tests {
             let times: Vec<f64> = before.iter().map(|before| direct - before).collect();
             isa.run(SamplePressure { signal, times: &times })
         };
-        setup.probe.places().enumerate().flat_map(of_receiver).collect()
+        setup.probe.places().enumerate().flat_map(receiver_pressures).collect()
     }
 
     /// Without and with the echoes of a thin coupling's outer face, from a level and a tilted probe, half
@@ -240,8 +240,8 @@ mod tests {
             setup.layers.coupling.thickness = thickness;
             setup.probe.tilt = tilt;
             for faces in [OuterFaces::None, OuterFaces::Audible] {
-                let of = |waves| pressures_before(&setup, &bone, waves, faces, &before);
-                let (all, early) = (of(Waves::All), of(Waves::Early));
+                let pressures = |waves| pressures_before(&setup, &bone, waves, faces, &before);
+                let (all, early) = (pressures(Waves::All), pressures(Waves::Early));
                 let largest = all.iter().fold(0.0, |largest: f64, p| largest.max(p.abs()));
                 assert!(largest > 0.0);
                 for (all, early) in all.iter().zip(&early) {

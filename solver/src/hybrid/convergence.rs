@@ -144,7 +144,7 @@ impl<'a> SmoothLoadStudy<'a> {
         Mesh::with_sizes(self.setup, &self.scope, order, [size; 3])
     }
 
-    /// Kernel that computes the largest stable time step, s.
+    /// Returns the largest stable time step, s.
     fn limit(&mut self, mesh: &Mesh) -> f64 {
         Isa::fastest().run(Limit {
             operator: &Operator::new(self.setup, self.bone, mesh),
@@ -168,7 +168,7 @@ impl<'a> SmoothLoadStudy<'a> {
         let step = self.spacing() / ratio as f64;
         let times = Times { step, ratio, samples: SAMPLES };
         let width = LOAD_WIDTH / self.setup.probe.center_frequency;
-        self.memory.rest(times);
+        self.memory.reset(times);
         for (n, load) in self.memory.load.iter_mut().enumerate() {
             let t = n as f64 * times.step / width - LOAD_DELAY;
             *load = Lanes::splat(libm::exp(-t * t));

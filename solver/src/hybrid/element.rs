@@ -39,7 +39,6 @@ impl Element {
         Self { nodes, weights, derivative }
     }
 
-    /// Number of nodes.
     pub(super) fn count(&self) -> usize {
         self.nodes.len()
     }

@@ -63,7 +63,7 @@ pub(super) struct MarchWorkspace {
 
 impl MarchWorkspace {
     /// Makes room for a load and a record.
-    pub(super) fn rest(&mut self, times: Times) {
+    pub(super) fn reset(&mut self, times: Times) {
         for (lanes, len) in
             [(&mut self.load, times.samples * times.ratio + 2), (&mut self.record, times.samples)]
         {
@@ -103,7 +103,7 @@ impl Kernel for March<'_> {
         let memory = self.memory;
         memory.pressures.clear();
         memory.pressures.resize(samples * self.receivers.len(), 0.0);
-        memory.rest(self.times);
+        memory.reset(self.times);
         let (node, weights) = self.plan.mesh.receiver(self.height);
         let mut finite = true;
         for block in 0..self.plan.blocks() {
@@ -192,7 +192,7 @@ mod tests {
         let times = Times { step, ratio: 1, samples };
         let k = Lanes(std::array::from_fn(|lane| 600.0 * lane as f64));
         let mut memory = MarchWorkspace::default();
-        memory.rest(times);
+        memory.reset(times);
         let pulse = |n: usize| {
             let t = n as f64 * step / 0.15e-6 - 6.1;
             libm::exp(-t * t)

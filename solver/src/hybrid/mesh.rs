@@ -119,7 +119,7 @@ impl Mesh {
 /// Returns the longest path, m, across the coupling fluid on which a wave can arrive within its
 /// window.
 pub(super) fn longest_coupling_path(setup: &Setup, scope: &Scope) -> f64 {
-    scope.across() / slowness(setup.layers.coupling.sound_speed, scope.speed)
+    scope.longest_time_across() / slowness(setup.layers.coupling.sound_speed, scope.speed)
 }
 
 /// Returns the speed, m/s, of the waves for which elements in the bone are made.

@@ -113,7 +113,7 @@ impl<const COUPLING: usize> Operator<COUPLING> {
 
         self.coupling.apply::<COUPLING, V, S>(k, p1, p1_out, 0, sink);
         let drive = Lanes::splat(self.coupling.drive);
-        let moved = self.across(&u_out[top..]);
+        let moved = self.component_across(&u_out[top..]);
         for c in 0..COUPLING {
             p1_out[c] = drive.mul_add(moved[c], p1_out[c]);
         }
@@ -122,7 +122,7 @@ impl<const COUPLING: usize> Operator<COUPLING> {
 
         self.marrow.apply::<MARROW, V, S>(k, p2, p2_out, coupling + solid, sink);
         let drive = Lanes::splat(-self.marrow.drive);
-        let moved = self.across(&u_out[..SOLID]);
+        let moved = self.component_across(&u_out[..SOLID]);
         for c in 0..MARROW {
             p2_out[face + c] = drive.mul_add(moved[c], p2_out[face + c]);
         }
@@ -143,7 +143,7 @@ impl<const COUPLING: usize> Operator<COUPLING> {
 
     /// Returns the component across the layers, its real and imaginary part.
     #[inline(always)]
-    fn across(&self, face: &[Lanes]) -> [Lanes; 2] {
+    fn component_across(&self, face: &[Lanes]) -> [Lanes; 2] {
         let mut across = [Lanes::ZERO; 2];
         for i in 0..3 {
             let depth = Lanes::splat(self.solid.depth[i]);

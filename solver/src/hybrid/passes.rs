@@ -60,7 +60,6 @@ pub(super) struct Passes<'a> {
     pub(super) budget: WorkBudget,
 }
 
-/// Result of a pass.
 struct PassResult {
     pick: Pick,
     /// Extrema below these are noise, Pa per Pa of the pulse's amplitude; one per receiver.
@@ -162,7 +161,7 @@ impl Passes<'_> {
     fn pass(&mut self, finer: f64, before: Option<&PassResult>) -> Result<PassResult, Failure> {
         let after = PACKET_PERIODS / self.setup.probe.center_frequency;
         let scope = match before {
-            Some(found) => self.whole.until(&found.pick.times, after),
+            Some(found) => self.whole.end_after(&found.pick.times, after),
             None => self.whole.clone(),
         };
         let (times, dispersion) = self.march(finer, &scope)?;

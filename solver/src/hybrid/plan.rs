@@ -42,7 +42,7 @@ const STEPS_MAX: f64 = 2e5;
 /// Four passes of a plate of 1 mm in the paper's geometry take 1.1e8, and 7e8 at refinement 4.
 const WORK_MAX: f64 = 8e8;
 
-/// Everything that is fixed before the first time step, except its length.
+/// Everything that is fixed before the first time step, except the length of the steps.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     pub(super) mesh: Mesh,
@@ -52,7 +52,7 @@ pub(super) struct Plan {
     pub(super) wavenumber_limit: f64,
     /// Highest frequency that the mesh resolves, Hz.
     pub(super) band: f64,
-    /// Returns the end of the last window, s.
+    /// End of the last window, s.
     pub(super) end: f64,
 }
 
@@ -63,7 +63,6 @@ pub(super) struct Times {
     pub(super) step: f64,
     /// Time steps per sample.
     pub(super) ratio: usize,
-    /// Number of samples.
     pub(super) samples: usize,
 }
 
@@ -157,7 +156,7 @@ impl Plan {
     /// `limit` (s); their work is taken from the `budget`.
     ///
     /// # Errors
-    /// `NoConvergence` if there are too many.
+    /// `NoConvergence` if there are too many, or if they are too much work.
     pub(super) fn times(
         &self,
         setup: &Setup,

@@ -36,7 +36,7 @@ impl Scope {
     }
 
     /// Returns windows that end at most `after` (s) after each of `times` (s), one per receiver.
-    pub(super) fn until(&self, times: &[f64], after: f64) -> Self {
+    pub(super) fn end_after(&self, times: &[f64], after: f64) -> Self {
         let windows = self.windows.iter().zip(times);
         let windows =
             windows.map(|(span, time)| Span { to: span.to.min(time + after), ..*span }).collect();
@@ -55,8 +55,8 @@ impl Scope {
 
     /// Returns the longest time, s, that a wave can spend across layers and still arrive in a
     /// window.
-    pub(super) fn across(&self) -> f64 {
-        let spent = |span: &Span| span.to - span.distance / self.speed;
-        self.windows.iter().map(spent).fold(0.0, f64::max)
+    pub(super) fn longest_time_across(&self) -> f64 {
+        let time_across = |span: &Span| span.to - span.distance / self.speed;
+        self.windows.iter().map(time_across).fold(0.0, f64::max)
     }
 }

@@ -24,7 +24,7 @@ pub(super) fn stability_limit<V: Vector, const COUPLING: usize>(
     k: f64,
     state: &mut WaveState,
 ) -> f64 {
-    state.rest(operator);
+    state.reset(operator);
     let mut noise = 1_u64;
     for value in &mut state.now {
         for lane in 0..LANES {
@@ -67,7 +67,7 @@ pub(super) struct WaveState {
 
 impl WaveState {
     /// Sets everything to rest.
-    pub(super) fn rest<const COUPLING: usize>(&mut self, operator: &Operator<COUPLING>) {
+    pub(super) fn reset<const COUPLING: usize>(&mut self, operator: &Operator<COUPLING>) {
         let len = operator.len();
         for vector in [&mut self.now, &mut self.before, &mut self.first, &mut self.second] {
             vector.clear();
@@ -85,7 +85,7 @@ impl WaveState {
         load: [Lanes; 2],
         step: f64,
     ) {
-        self.rest(operator);
+        self.reset(operator);
         // ∫∫ of a load α t² + β t³ over one step, from its values.
         let mean = Lanes::splat(7.0 / 60.0).mul_add(load[0], Lanes::splat(-1.0 / 120.0) * load[1]);
         let out = &mut self.first;

@@ -26,7 +26,7 @@ const OUTLIERS: f64 = 0.01;
 const HALF_FREEDOM: usize = 3;
 
 /// Returns the data of parameter set `number`; `None` if too many realizations fail.
-pub(super) fn simulated(
+pub(super) fn simulate_data(
     study: &PosteriorCalibration,
     truth: &Point,
     number: u64,
@@ -45,30 +45,30 @@ pub(super) fn simulated(
     }
     velocities.truncate(count as usize);
     let mut generator = Generator::for_index(!study.seed, number);
-    Ok(Some(changed(study, velocities, subjects as usize, &mut generator)))
+    Ok(Some(change_data(study, velocities, subjects as usize, &mut generator)))
 }
 
-fn changed(
+fn change_data(
     study: &PosteriorCalibration,
     velocities: Vec<f64>,
     subjects: usize,
     generator: &mut Generator,
 ) -> Data {
     let mean = velocities.iter().sum::<f64>() / velocities.len() as f64;
-    let of = |change: &mut dyn FnMut(f64) -> f64| {
+    let change_all = |change: &mut dyn FnMut(f64) -> f64| {
         Data::from_velocities(velocities.iter().map(|&velocity| change(velocity)).collect())
     };
     match study.scenario {
         Scenario::Independent => Data::from_velocities(velocities),
         Scenario::Subjects => in_series(&velocities, subjects.min(velocities.len()), generator),
-        Scenario::Rounded => of(&mut |velocity| (velocity / STEP).round() * STEP),
-        Scenario::Outliers => of(&mut |velocity| match generator.uniform() / OUTLIERS {
+        Scenario::Rounded => change_all(&mut |velocity| (velocity / STEP).round() * STEP),
+        Scenario::Outliers => change_all(&mut |velocity| match generator.uniform() / OUTLIERS {
             below if below < 0.5 => 0.5 * velocity,
             below if below < 1.0 => 2.0 * velocity,
             _ => velocity,
         }),
         Scenario::HeavyTails => {
-            of(&mut |velocity| mean + student_scale(generator) * (velocity - mean))
+            change_all(&mut |velocity| mean + student_scale(generator) * (velocity - mean))
         }
     }
 }
@@ -114,7 +114,7 @@ mod tests {
             seed: 3,
             isa: Isa::fastest(),
         };
-        simulated(&study, &OPTIMUM, 0).unwrap().unwrap()
+        simulate_data(&study, &OPTIMUM, 0).unwrap().unwrap()
     }
 
     #[test]

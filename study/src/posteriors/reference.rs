@@ -44,38 +44,39 @@ const REPORTED: usize = 100;
 /// If a point has no ensemble.
 pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let velocities = velocities(&OPTIMUM, VELOCITIES, DATA_SEED, draws.isa)?;
-    let half = half_of(&velocities);
-    let Some(posterior) = posterior_of(Data::from_velocities(velocities.clone()), draws, None)?
+    let half = halve_data(&velocities);
+    let Some(posterior) =
+        compute_posterior(Data::from_velocities(velocities.clone()), draws, None)?
     else {
         return Ok(MarkdownTable::new(&["there is no posterior"]));
     };
-    progress(&described("posterior", &posterior));
-    let Some(proposal) = posterior_of(half, draws, Some(draws.realizations))? else {
+    progress(&describe("posterior", &posterior));
+    let Some(proposal) = compute_posterior(half, draws, Some(draws.realizations))? else {
         return Ok(MarkdownTable::new(&["there is no proposal"]));
     };
-    progress(&described("proposal", &proposal));
+    progress(&describe("proposal", &proposal));
     let Some(likelihood) = DataLikelihood::independent(&velocities, 0.0) else {
         return Ok(MarkdownTable::new(&["the data have no scatter"]));
     };
-    let errors = evaluated(&OPTIMUM, draws)?.map(|estimate| estimate.relative_errors());
+    let errors = evaluate(&OPTIMUM, draws)?.map(|estimate| estimate.relative_errors());
     let likelihood = likelihood.with_model_errors(errors.unwrap_or_default());
     let mut weighted = Vec::new();
     for draw in &proposal.draws {
-        let found = evaluated(&draw.point, draws)?.map(|estimate| estimate.moments);
+        let found = evaluate(&draw.point, draws)?.map(|estimate| estimate.moments);
         let log = found.map_or(f64::NEG_INFINITY, |found| {
             likelihood.log([found.mean, found.coefficient_of_variation].map(libm::log))
         });
         weighted.push((draw.point, log - draw.log_density));
         if weighted.len().is_multiple_of(REPORTED) {
-            let effective = effective(&normalised(&weighted));
+            let effective = effective(&normalise(&weighted));
             progress(&format!("{} draws, {effective:.0} effective", weighted.len()));
         }
     }
-    Ok(compared(&posterior, &normalised(&weighted)))
+    Ok(comparison_table(&posterior, &normalise(&weighted)))
 }
 
 /// Returns half the data, as moments with a count.
-fn half_of(velocities: &[f64]) -> Data {
+fn halve_data(velocities: &[f64]) -> Data {
     let moments = Data::from_velocities(velocities.to_vec()).moments(0);
     let measurements = Measurements::Moments {
         mean: moments.mean,
@@ -86,7 +87,7 @@ fn half_of(velocities: &[f64]) -> Data {
 }
 
 /// Computes a posterior with this number of draws, or the default one.
-fn posterior_of(
+fn compute_posterior(
     data: Data,
     study: &Draws,
     draws: Option<u64>,
@@ -99,15 +100,14 @@ fn posterior_of(
     Ok(found.result.conclusions.posterior)
 }
 
-fn described(name: &str, posterior: &Posterior) -> String {
+fn describe(name: &str, posterior: &Posterior) -> String {
     format!(
         "{name}: {} evaluations, {:.0} effective draws, efficiency {:.3}",
         posterior.evaluations, posterior.effective_draws, posterior.check_efficiency
     )
 }
 
-/// Evaluates the model.
-fn evaluated(point: &Point, study: &Draws) -> Result<Option<Estimate>, StudyError> {
+fn evaluate(point: &Point, study: &Draws) -> Result<Option<Estimate>, StudyError> {
     let monte_carlo = model_germs(MODEL_REALIZATIONS, study.seed);
     let outcomes = outcomes(point, &monte_carlo, study.isa)?;
     let feasible = PointStatistics::from_outcomes(&monte_carlo, point, &outcomes).feasible;
@@ -115,7 +115,7 @@ fn evaluated(point: &Point, study: &Draws) -> Result<Option<Estimate>, StudyErro
 }
 
 /// Returns the points with their weights, which have the sum 1.
-fn normalised(weighted: &[(Point, f64)]) -> Vec<(Point, f64)> {
+fn normalise(weighted: &[(Point, f64)]) -> Vec<(Point, f64)> {
     let largest = weighted.iter().map(|one| one.1).fold(f64::NEG_INFINITY, f64::max);
     let weight = |log: f64| libm::exp(log - largest);
     let total: f64 = weighted.iter().map(|one| weight(one.1)).sum();
@@ -127,7 +127,7 @@ fn effective(weighted: &[(Point, f64)]) -> f64 {
 }
 
 /// Returns the table of both posteriors.
-fn compared(posterior: &Posterior, weighted: &[(Point, f64)]) -> MarkdownTable {
+fn comparison_table(posterior: &Posterior, weighted: &[(Point, f64)]) -> MarkdownTable {
     let mut table = MarkdownTable::new(&[
         "quantity", "mean", "off by", "s.d.", "off by", "2.5 %", "off by", "97.5 %", "off by",
     ]);
@@ -159,11 +159,11 @@ fn standard_errors(values: &[(f64, f64)], number: u64) -> [f64; 4] {
     let mut sums = [[0.0; 2]; 4];
     for resampling in 0..RESAMPLINGS {
         let mut generator = Generator::for_index(number, resampling);
-        let mut drawn = || {
+        let mut draw = || {
             let place = generator.between(0.0, values.len() as f64) as usize;
             values[place.min(values.len() - 1)]
         };
-        let found = exact((0..values.len()).map(|_| drawn()).collect());
+        let found = exact((0..values.len()).map(|_| draw()).collect());
         for (sums, value) in sums.iter_mut().zip(found) {
             *sums = [sums[0] + value, sums[1] + value * value];
         }

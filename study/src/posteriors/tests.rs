@@ -9,7 +9,7 @@ use osteon_common::statistics::estimate;
 use osteon_solver::{Isa, Solver};
 
 use super::*;
-use crate::draws::{OPTIMUM, solved};
+use crate::draws::{OPTIMUM, solve_realizations};
 
 /// Realizations of the model: the comparison is exact for any number, but the mean velocity of a few
 /// bones is rough by 1e-6 where passes are blended, and these are enough for that not to matter.
@@ -59,7 +59,7 @@ impl Grid {
         }
         let monte_carlo = &self.job.monte_carlo;
         let ensemble = Ensemble::drawn(&point, monte_carlo.germs()).unwrap();
-        let solved = solved(&self.solver, &ensemble, REALIZATIONS);
+        let solved = solve_realizations(&self.solver, &ensemble, REALIZATIONS);
         let outcomes: Vec<Outcome> = solved.into_iter().map(|one| one.outcome).collect();
         let found = estimate(monte_carlo, &point, &outcomes).unwrap().moments;
         self.likelihood.log([found.mean, found.coefficient_of_variation].map(libm::log))

@@ -13,10 +13,10 @@ const TASK: Task = Task { attachment: 1, batch: 1 };
 const DEADLINE: Duration = Duration::from_secs(60);
 
 fn work(point: Point, first: u64, count: u32) -> Work {
-    drawn(point, GermSource::streams(5), first, count)
+    draw_work(point, GermSource::streams(5), first, count)
 }
 
-fn drawn(point: Point, germs: GermSource, first: u64, count: u32) -> Work {
+fn draw_work(point: Point, germs: GermSource, first: u64, count: u32) -> Work {
     let evaluation = EvaluationInput {
         id: 1,
         setup: Setup::default(),
@@ -28,7 +28,7 @@ fn drawn(point: Point, germs: GermSource, first: u64, count: u32) -> Work {
     Work { evaluation: Arc::new(evaluation), first, count }
 }
 
-fn solved(threads: u32, work: Work) -> Vec<RealizationResult> {
+fn solve(threads: u32, work: Work) -> Vec<RealizationResult> {
     let (sender, receiver) = mpsc::channel();
     let mut cores = Cores::new(threads, Isa::fastest()).unwrap();
     assert_eq!(cores.slots(), threads);
@@ -41,11 +41,11 @@ fn solved(threads: u32, work: Work) -> Vec<RealizationResult> {
 
 #[test]
 fn outcomes_do_not_depend_on_threads_or_batches() {
-    let whole = solved(1, work(POINT, 0, 12));
-    assert_eq!(solved(3, work(POINT, 0, 12)), whole);
+    let whole = solve(1, work(POINT, 0, 12));
+    assert_eq!(solve(3, work(POINT, 0, 12)), whole);
     let parts = [(0, 5), (5, 1), (6, 6)];
     let joined: Vec<_> =
-        parts.iter().flat_map(|&(first, count)| solved(2, work(POINT, first, count))).collect();
+        parts.iter().flat_map(|&(first, count)| solve(2, work(POINT, first, count))).collect();
     assert_eq!(joined, whole);
 }
 
@@ -62,7 +62,7 @@ fn outcomes_are_those_of_the_solver_alone() {
                 RealizationResult::solved(arrival.velocity, arrival.estimated_error)
             })
             .collect();
-        assert_eq!(solved(2, drawn(POINT, germs, 3, 4)), expected, "{scheme:?}");
+        assert_eq!(solve(2, draw_work(POINT, germs, 3, 4)), expected, "{scheme:?}");
     }
 }
 
@@ -73,12 +73,12 @@ fn outcomes_with_random_setups_do_not_depend_on_threads_or_batches() {
     let random = RandomQuantities { bone_thickness: thickness, ..RandomQuantities::default() };
     let germs = GermSource { seed: 5, scheme: GermScheme::Sobol { points: 5 } };
     let work = |first, count| {
-        let Work { evaluation, .. } = drawn(POINT, germs, first, count);
+        let Work { evaluation, .. } = draw_work(POINT, germs, first, count);
         let evaluation = EvaluationInput { random, ..*evaluation };
         Work { evaluation: Arc::new(evaluation), first, count }
     };
-    let whole = solved(1, work(0, 7));
-    let joined = [solved(3, work(0, 4)), solved(2, work(4, 3))].concat();
+    let whole = solve(1, work(0, 7));
+    let joined = [solve(3, work(0, 4)), solve(2, work(4, 3))].concat();
     assert_eq!(joined, whole);
     let ensemble = Ensemble::drawn(&POINT, germs).unwrap();
     let thicknesses = ensemble.clone().with_random(random);
@@ -96,7 +96,7 @@ fn a_point_without_an_ensemble_fails_at_every_index() {
     let mut inadmissible = POINT;
     inadmissible.0[5] = 1.2;
     assert_eq!(
-        solved(2, work(inadmissible, 0, 3)),
+        solve(2, work(inadmissible, 0, 3)),
         [RealizationResult::failed(FailureKind::NotFinite); 3]
     );
 }

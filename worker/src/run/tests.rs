@@ -195,7 +195,7 @@ async fn a_device_is_told_what_to_compute_and_what_to_forget() {
     let scene = scene("device", Script::Work);
     let backend = FakeBackend::default();
     let seen = Arc::clone(&backend.seen);
-    let ended = run_on(Box::new(backend), config(&scene), pending());
+    let ended = run_on_backend(Box::new(backend), config(&scene), pending());
     timeout(Duration::from_secs(60), ended).await.unwrap().unwrap();
     let heard = scene.heard.lock().unwrap().clone();
     let Some(Request::Hello(hello)) = heard.first() else { panic!("{heard:?}") };
@@ -262,7 +262,7 @@ fn config(scene: &Scene) -> WorkerConfig {
     }
 }
 
-async fn reached(attachments: &AtomicU32, count: u32) {
+async fn wait_for_attachments(attachments: &AtomicU32, count: u32) {
     while attachments.load(Ordering::SeqCst) < count {
         tokio::task::yield_now().await;
     }
@@ -294,7 +294,7 @@ async fn a_lost_coordinator_is_found_again() {
     for (name, script) in [("leave", Script::Leave), ("silence", Script::Silence)] {
         let scene = scene(name, script);
         let attachments = Arc::clone(&scene.attachments);
-        let shutdown = async move { reached(&attachments, 3).await };
+        let shutdown = async move { wait_for_attachments(&attachments, 3).await };
         let limit = Duration::from_secs(60);
         timeout(limit, run(config(&scene), shutdown)).await.unwrap().unwrap();
         assert!(scene.attachments.load(Ordering::SeqCst) >= 3, "{name}");

@@ -52,7 +52,7 @@ impl Recorder {
     }
 
     /// The coordinator closes the stream of a worker that has drained.
-    fn dismissed(&mut self) {
+    fn dismiss(&mut self) {
         self.event(Event::Lost);
         self.expect(&[Effect::Leave]);
     }
@@ -78,7 +78,7 @@ impl Recorder {
     }
 
     fn complete(&mut self, attachment: u64, batch: u64) {
-        let computed = Computed::Complete { solved: solved(), elapsed_s: 0.5 };
+        let computed = Computed::Complete { solved: sample_results(), elapsed_s: 0.5 };
         self.event(Event::Computed(Task { attachment, batch }, computed));
     }
 
@@ -122,7 +122,7 @@ fn abandon(attachment: u64, batch: u64) -> Effect {
     Effect::Abandon(Task { attachment, batch })
 }
 
-fn solved() -> Vec<RealizationResult> {
+fn sample_results() -> Vec<RealizationResult> {
     let success = RealizationResult::solved(3900.0, 2e-5);
     vec![success, RealizationResult::failed(FailureKind::NoArrival)]
 }
@@ -242,7 +242,7 @@ fn a_drained_worker_finishes_what_it_holds() {
     worker.expect(&[answer(5)]);
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.dismissed();
+    worker.dismiss();
 }
 
 /// The coordinator sends a batch before it has heard that the worker drains.
@@ -258,7 +258,7 @@ fn a_batch_on_its_way_to_a_worker_that_drains_is_answered() {
     worker.expect(&[HEARTBEAT]);
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.dismissed();
+    worker.dismiss();
 }
 
 #[test]
@@ -273,7 +273,7 @@ fn a_worker_that_drains_before_its_welcome_tells_so_and_answers_what_is_on_its_w
     worker.expect(&[compute(1, 4)]);
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.dismissed();
+    worker.dismiss();
 }
 
 #[test]
@@ -314,11 +314,11 @@ fn a_worker_that_the_coordinator_sends_away_answers_what_it_holds_and_leaves() {
     worker.nothing_else();
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.dismissed();
+    worker.dismiss();
     let mut idle = Recorder::attached();
     idle.message(leave());
     idle.expect(&[DRAIN]);
-    idle.dismissed();
+    idle.dismiss();
 }
 
 #[test]
@@ -354,7 +354,7 @@ fn a_worker_without_work_leaves_after_its_idle_timeout() {
     worker.expect(&[HEARTBEAT]);
     worker.tick_at(23.0);
     worker.expect(&[DRAIN]);
-    worker.dismissed();
+    worker.dismiss();
 }
 
 #[test]
@@ -438,20 +438,20 @@ fn malformed(defect: Malformed) -> Effect {
 
 #[test]
 fn a_batch_of_an_unknown_evaluation_ends_the_worker() {
-    let of = |evaluation| {
+    let batch_of = |evaluation| {
         Response::Batch(v1::Batch { batch: 1, evaluation, count: 1, ..v1::Batch::default() })
     };
-    let unknown = |evaluation| [malformed(Malformed::UnknownEvaluation { evaluation })];
+    let unknown_evaluation = |evaluation| [malformed(Malformed::UnknownEvaluation { evaluation })];
     let mut worker = Recorder::attached();
-    worker.message(of(7));
-    worker.expect(&unknown(7));
+    worker.message(batch_of(7));
+    worker.expect(&unknown_evaluation(7));
 
     // Each stream has its own evaluations.
     let mut worker = Recorder::attached();
     worker.event(Event::Lost);
     worker.greet();
-    worker.message(of(EVALUATION));
-    worker.expect(&unknown(EVALUATION));
+    worker.message(batch_of(EVALUATION));
+    worker.expect(&unknown_evaluation(EVALUATION));
 
     // The oldest is forgotten, but not what a worker computes of it.
     let mut worker = Recorder::attached();
@@ -460,8 +460,8 @@ fn a_batch_of_an_unknown_evaluation_ends_the_worker() {
     (100..100 + EVALUATIONS_KEPT_MAX as u64).for_each(|id| worker.evaluation(id));
     worker.complete(1, 4);
     worker.expect(&[answer(4)]);
-    worker.message(of(EVALUATION));
-    worker.expect(&unknown(EVALUATION));
+    worker.message(batch_of(EVALUATION));
+    worker.expect(&unknown_evaluation(EVALUATION));
 }
 
 #[test]

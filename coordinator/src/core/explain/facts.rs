@@ -87,7 +87,7 @@ pub(crate) struct OldestBatch {
 impl JobFacts {
     /// Collects the facts about a job at `now`; `None` if no client can know the job yet.
     pub(crate) fn new(state: &State, id: JobId, now: Duration) -> Option<Self> {
-        let mut facts = Self::of_coordinator(state, id, now);
+        let mut facts = Self::from_coordinator(state, id, now);
         if let Some(ended) = state.ended.get(&id) {
             let ending = &ended.end.ending;
             let reason = ending.reason.clone().unwrap_or_default();
@@ -132,12 +132,12 @@ impl JobFacts {
     }
 
     /// Returns the number of realizations that the evaluation under way lacks.
-    pub(crate) fn left(&self) -> u64 {
+    pub(crate) fn lacking_realizations(&self) -> u64 {
         self.realizations.saturating_sub(self.filled)
     }
 
     /// Collects what is the same for all jobs, and who uses the slots.
-    fn of_coordinator(state: &State, job: JobId, now: Duration) -> Self {
+    fn from_coordinator(state: &State, job: JobId, now: Duration) -> Self {
         let mut facts = Self {
             job,
             standing: Standing::Waiting,

@@ -44,10 +44,11 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     }
     let mut kept = poison::dispatch(turn);
     overdue::dispatch(turn, &mut kept);
-    sizing::forget_unknown(turn.state, turn.now);
+    sizing::allow_unknown_again(turn.state, turn.now);
     while schedule::work_waits(turn.state) && hand_one(turn, &kept) {}
     if schedule::next_job(turn.state).is_some() {
-        // While batches wait, which are sent after one of the next events, no worker gets a duplicate.
+        // The batches that wait are sent after one of the next events. Until then no worker gets a
+        // duplicate.
         return;
     }
     duplicates::duplicate_late_batches(turn);
@@ -57,7 +58,7 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     duplicates::duplicate_slow_batches(turn);
 }
 
-/// Sends one check or batch to the first free worker that gets one; returns whether there is one. The
+/// Sends one check or batch to the first free worker that may have one; returns whether any may. The
 /// workers in `kept` receive nothing.
 fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
     let Some(first) = schedule::free_workers(turn.state, kept).next() else {
@@ -69,8 +70,8 @@ fn hand_one(turn: &mut Turn, kept: &BTreeSet<WorkerId>) -> bool {
     let is_sound =
         |worker| turn.state.workers.get(&worker).is_some_and(|it| turn.state.is_sound(it));
     let others: Vec<WorkerId> = if !schedule::checks_wait(turn.state) && is_sound(first) {
-        // The first holds the fewest batches. If no check waits and it gets no batch, no other sound worker
-        // gets one.
+        // No check waits, and the sound worker with the fewest batches gets none: then no other sound one
+        // does, and only those on probation remain.
         turn.state.order.on_probation().filter(|worker| !kept.contains(worker)).collect()
     } else {
         schedule::free_workers(turn.state, kept).skip(1).collect()
@@ -87,20 +88,22 @@ fn hand(turn: &mut Turn, worker: WorkerId) -> bool {
 /// Sends a worker a batch of the job that is next in turn; `None` if it gets none now.
 fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
     let attached = turn.state.workers.get(&worker)?;
-    let may = |id: JobId, job: &Job| attached.rates.contains_key(&id) || !sizing::must_wait(job);
+    let may = |id: JobId, job: &Job| {
+        attached.rates.contains_key(&id) || !sizing::must_wait_for_rates(job)
+    };
     let job = schedule::next_job_that_may(turn.state, may)?;
     let (attempt, queued) = turn.state.jobs.get(&job).and_then(next_evaluation)?;
     let size = if turn.state.is_sound(attached) {
         let fleet = sizing::fleet_rate(turn.state, job);
         let attached = turn.state.workers.get(&worker)?;
-        let further = turn.state.jobs.get(&job).map_or(0, ahead::left);
+        let further = turn.state.jobs.get(&job).map_or(0, ahead::remaining_realizations);
         let size = sizing::batch_size(turn.state, attached, job, fleet, (queued, further));
-        // A worker that holds only speculative batches counts as idle: other batches go before those.
+        // A worker that holds only speculative batches counts as idle, because other batches replace them.
         let is_busy = turn.state.order.place(worker).is_some_and(|place| place.held > 0);
         if is_busy && sizing::is_one_batch_each(turn.state, attached, job, fleet, size) {
             return None;
         }
-        let is_unknown = sizing::rate(attached, job, fleet).is_none();
+        let is_unknown = sizing::worker_rate(attached, job, fleet).is_none();
         turn.state.jobs.get_mut(&job)?.unknown_sent += usize::from(is_unknown);
         size
     } else if !turn.state.probation.is_paused(&attached.name, turn.now)
@@ -110,7 +113,7 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
     } else {
         return None;
     };
-    let indices = turn.state.jobs.get_mut(&job)?.certain_with_mut(attempt)?.take(size)?;
+    let indices = turn.state.jobs.get_mut(&job)?.certain_evaluation_mut(attempt)?.take(size)?;
     turn.state.last_served = Some(job);
     ahead::refresh(turn, job);
     let assignment = Assignment { job, attempt, indices };
@@ -119,9 +122,9 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
     Some(batch)
 }
 
-/// Returns the attempt at the evaluation of a job whose realizations are sent next, with the number of
-/// those that wait: the one that the search asked for comes first.
+/// Returns the attempt at the evaluation whose realizations are sent next, and the number of those that
+/// wait. The evaluation that the search asked for comes first.
 fn next_evaluation(job: &Job) -> Option<(u64, u64)> {
-    let evaluation = job.certain().find(|evaluation| !evaluation.queue.is_empty())?;
+    let evaluation = job.certain_evaluations().find(|evaluation| !evaluation.queue.is_empty())?;
     Some((evaluation.attempt, evaluation.queued()))
 }

@@ -93,7 +93,7 @@ impl Rig {
             _ => false,
         };
         let acts = effects.iter().filter(|effect| !aside(effect));
-        acts.map(described).collect()
+        acts.map(describe).collect()
     }
 
     /// Asserts that an event causes exactly these effects.
@@ -158,10 +158,10 @@ fn identification(realizations: u64) -> JobSpecification {
 }
 
 fn submit(reply_id: u64, request_id: &str, specification: JobSpecification) -> Event {
-    submit_of("", reply_id, request_id, specification)
+    submit_for("", reply_id, request_id, specification)
 }
 
-fn submit_of(
+fn submit_for(
     client: &str,
     reply_id: u64,
     request_id: &str,
@@ -181,7 +181,7 @@ fn request(reply_id: u64, request: Request) -> Event {
     Event::Requested { reply_id: ReplyId(reply_id), request }
 }
 
-fn stored(job: u64, key: RecordKey) -> Event {
+fn stored_event(job: u64, key: RecordKey) -> Event {
     Event::Stored { job: JobId(job), key }
 }
 
@@ -226,7 +226,7 @@ fn end_of_stream(worker: u64) -> Event {
     Event::StreamEnded { worker: WorkerId(worker) }
 }
 
-fn described(effect: &Effect) -> String {
+fn describe(effect: &Effect) -> String {
     match effect {
         Effect::Welcome { worker, lease } => format!("welcome {worker}, lease {lease}"),
         Effect::Send { worker, batch, work } => {
@@ -264,7 +264,9 @@ fn described(effect: &Effect) -> String {
             let reason = end.ending.reason.as_deref().unwrap_or_default();
             format!("store job {} end: {} {reason}", end.job, end.ending.status.name())
         }
-        Effect::Answer { reply_id, answer } => format!("answer {reply_id}: {}", answered(answer)),
+        Effect::Answer { reply_id, answer } => {
+            format!("answer {reply_id}: {}", describe_answer(answer))
+        }
         Effect::Publish { job, .. } => format!("publish {job}"),
         Effect::ReportStoreFailure { error, waited } => {
             format!("give_up after {waited:?}: {error}")
@@ -274,7 +276,7 @@ fn described(effect: &Effect) -> String {
     }
 }
 
-fn answered(answer: &Answer) -> String {
+fn describe_answer(answer: &Answer) -> String {
     match answer {
         Answer::Submitted(job) => format!("job {job}"),
         Answer::Snapshot(snapshot) => {

@@ -14,15 +14,15 @@ fn frame(kind: u8, flags: u8, length: u32) -> Vec<u8> {
 }
 
 /// Returns a connection whose preface has arrived.
-fn begun() -> ControlFrames {
+fn begun_connection() -> ControlFrames {
     let mut frames = ControlFrames::new();
-    frames.arrived(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n").unwrap();
+    frames.follow_arrived(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n").unwrap();
     frames
 }
 
 /// Returns how many equal frames may arrive, at most `most`. A connection that was ended would go on here.
-fn accepted(frames: &mut ControlFrames, frame: &[u8], most: u32) -> u32 {
-    let count = (0..most).take_while(|_| frames.arrived(frame).is_ok()).count();
+fn count_accepted(frames: &mut ControlFrames, frame: &[u8], most: u32) -> u32 {
+    let count = (0..most).take_while(|_| frames.follow_arrived(frame).is_ok()).count();
     frames.skip = 0;
     count as u32
 }
@@ -50,7 +50,7 @@ async fn what_brings_nothing_forward_is_bounded() {
         (CONTINUATION, 0, 1, true),
     ] {
         let expected = if free { many } else { PERMITS_MAX };
-        let found = accepted(&mut begun(), &frame(kind, flags, length), many);
+        let found = count_accepted(&mut begun_connection(), &frame(kind, flags, length), many);
         assert_eq!(found, expected, "type {kind}, flags {flags}, {length} bytes");
     }
 }
@@ -66,50 +66,50 @@ async fn frames_are_found_in_pieces_of_any_length() {
     for piece in [1, 2, 7, 9, 16, 1000, bytes.len()] {
         let mut frames = ControlFrames::new();
         for piece in bytes.chunks(piece) {
-            frames.arrived(piece).unwrap();
+            frames.follow_arrived(piece).unwrap();
         }
         assert_eq!(frames.permits, 0, "pieces of {piece} bytes");
-        assert_eq!(frames.arrived(&frame(PING, 0, 8)), Err(TooManyControlFrames));
+        assert_eq!(frames.follow_arrived(&frame(PING, 0, 8)), Err(TooManyControlFrames));
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn permits_come_back_with_time() {
-    let mut frames = begun();
+    let mut frames = begun_connection();
     let ping = frame(PING, 0, 8);
-    assert_eq!(accepted(&mut frames, &ping, u32::MAX), PERMITS_MAX);
+    assert_eq!(count_accepted(&mut frames, &ping, u32::MAX), PERMITS_MAX);
     advance(Duration::from_secs(1)).await;
-    assert_eq!(accepted(&mut frames, &ping, u32::MAX), PERMITS_PER_SECOND);
+    assert_eq!(count_accepted(&mut frames, &ping, u32::MAX), PERMITS_PER_SECOND);
     // A little at a time is not lost, and a long rest gives no more than a new connection has.
     for _ in 0..10 {
         advance(Duration::from_millis(4)).await;
-        accepted(&mut frames, &ping, u32::MAX);
+        count_accepted(&mut frames, &ping, u32::MAX);
     }
     advance(Duration::from_secs(3600)).await;
-    assert_eq!(accepted(&mut frames, &ping, u32::MAX), PERMITS_MAX);
+    assert_eq!(count_accepted(&mut frames, &ping, u32::MAX), PERMITS_MAX);
     // A probe each second for a day, as often as the most anxious client.
     for _ in 0..86_400 {
         advance(Duration::from_secs(1)).await;
-        frames.arrived(&ping).unwrap();
+        frames.follow_arrived(&ping).unwrap();
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn what_was_sent_pays_for_window_updates() {
-    let mut frames = begun();
+    let mut frames = begun_connection();
     let update = frame(WINDOW_UPDATE, 0, 4);
     // A million messages of the length of a small batch, in no time, each with two updates.
     for _ in 0..1_000_000 {
-        frames.sent(44);
-        frames.arrived(&update).unwrap();
-        frames.arrived(&update).unwrap();
+        frames.note_sent(44);
+        frames.follow_arrived(&update).unwrap();
+        frames.follow_arrived(&update).unwrap();
     }
     assert_eq!(frames.permits, PERMITS_MAX);
     let paid = frames.updates;
     assert!(paid <= UPDATES_MAX, "{paid}");
-    assert_eq!(accepted(&mut frames, &update, u32::MAX), paid + PERMITS_MAX);
+    assert_eq!(count_accepted(&mut frames, &update, u32::MAX), paid + PERMITS_MAX);
     // It pays for nothing else: answers to probes do not pay for probes.
-    let mut frames = begun();
-    frames.sent(usize::MAX);
-    assert_eq!(accepted(&mut frames, &frame(PING, 0, 8), u32::MAX), PERMITS_MAX);
+    let mut frames = begun_connection();
+    frames.note_sent(usize::MAX);
+    assert_eq!(count_accepted(&mut frames, &frame(PING, 0, 8), u32::MAX), PERMITS_MAX);
 }

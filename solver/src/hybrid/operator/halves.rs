@@ -4,8 +4,8 @@
 //! of a first derivative, even to odd and odd to even. In this form half of a matrix is zero.
 //!
 //! Of n values the even part is s_i = x_i + x_(n-1-i), which for the middle node of an odd n is
-//! twice its value; the odd part is d_i = x_i - x_(n-1-i). Back, x_i = (s_i + d_i)/2 and x_(n-1-i)
-//! = (s_i - d_i)/2.
+//! twice its value; the odd part is d_i = x_i - x_(n-1-i). The values follow from both parts as
+//! x_i = (s_i + d_i)/2 and x_(n-1-i) = (s_i - d_i)/2.
 
 /// Maximum number of nodes in the even part: half of the 13 of degree 12, rounded up.
 pub(super) const HALF: usize = 7;

@@ -26,7 +26,6 @@ use crate::vector::Vector;
 
 /// Real numbers per node: real parts, then imaginary parts, of three displacements.
 pub(in crate::hybrid) const SOLID: usize = 6;
-/// A node.
 pub(super) type ElementNode = [Lanes; SOLID];
 
 /// The bone between its fluids.
@@ -81,7 +80,7 @@ impl SolidLayer {
         let half = 0.5 * mesh.size;
         let count = element.count();
         let axes = principal_axes(&block(bone, 2, 2));
-        let along = |j: usize, l: usize| turned(&axes, &block(bone, j, l));
+        let along = |j: usize, l: usize| rotate_block(&axes, &block(bone, j, l));
         let (a33, a31, a11) = (along(2, 2), along(2, 0), along(0, 0));
         let at_face = 1.0 / (element.weights[0] * half);
         let each = |entry: &dyn Fn(usize, usize) -> f64| -> Matrix3 {
@@ -286,7 +285,7 @@ fn block(bone: &Bone, j: usize, l: usize) -> Matrix3 {
 }
 
 /// Returns Qᵀ `a` Q, where the columns of Q are `axes`.
-fn turned(axes: &Matrix3, a: &Matrix3) -> Matrix3 {
+fn rotate_block(axes: &Matrix3, a: &Matrix3) -> Matrix3 {
     std::array::from_fn(|i| {
         std::array::from_fn(|m| {
             let mut sum = 0.0;

@@ -54,7 +54,7 @@ fn noise<const C: usize>(operator: &Operator<C>, seed: u64) -> Vec<Lanes> {
     x
 }
 
-fn applied<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes]) -> Vec<Lanes> {
+fn apply<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes]) -> Vec<Lanes> {
     let mut scratch = Scratch::default();
     let mut out = vec![Lanes::ZERO; x.len()];
     operator.apply::<Scalar, Keep>(k, x, Lanes::ZERO, &mut scratch, &mut out, &mut Keep);
@@ -81,7 +81,7 @@ fn inner<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes], y: &[Lan
     let mut u = y.to_vec();
     u[..coupling].fill(Lanes::ZERO);
     u[coupling + solid..].fill(Lanes::ZERO);
-    let forces = applied(operator, k, &u);
+    let forces = apply(operator, k, &u);
     let scale = setup.layers.coupling.density
         * setup.layers.coupling.sound_speed
         * setup.layers.coupling.sound_speed
@@ -117,9 +117,9 @@ fn the_operator_is_self_adjoint_and_not_positive() {
     let operator = Operator::<2>::new(&setup(), &bone(), &mesh());
     let k = wavenumbers();
     let (x, y) = (noise(&operator, 1), noise(&operator, 2));
-    let one = inner(&operator, k, &x, &applied(&operator, k, &y));
-    let other = inner(&operator, k, &y, &applied(&operator, k, &x));
-    let own = inner(&operator, k, &x, &applied(&operator, k, &x));
+    let one = inner(&operator, k, &x, &apply(&operator, k, &y));
+    let other = inner(&operator, k, &y, &apply(&operator, k, &x));
+    let own = inner(&operator, k, &x, &apply(&operator, k, &x));
     for lane in 0..LANES {
         assert!(own.0[lane] < 0.0);
         assert!((one.0[lane] - other.0[lane]).abs() < 1e-11 * own.0[lane].abs(), "lane {lane}");
@@ -132,14 +132,14 @@ fn energy_without_source_is_conserved() {
     let k = wavenumbers();
     let mut state = WaveState::default();
     let step = 0.9 * stability_limit::<Scalar, _>(&operator, k.0[LANES - 1], &mut state);
-    state.rest(&operator);
+    state.reset(&operator);
     state.now = noise(&operator, 3);
     state.before = noise(&operator, 4);
     // The scheme is x⁺ - 2x + x⁻ = step² B x with B = A + step²/12 A², and keeps
     // |x⁺ - x|² - step² (x⁺, B x).
     let energy = |state: &WaveState| {
-        let once = applied(&operator, k, &state.before);
-        let twice = applied(&operator, k, &once);
+        let once = apply(&operator, k, &state.before);
+        let twice = apply(&operator, k, &once);
         let bent: Vec<Lanes> = once
             .iter()
             .zip(&twice)
@@ -163,7 +163,7 @@ fn energy_without_source_is_conserved() {
 }
 
 /// Drives the bone's face by a smooth load; the states of fluid 1 at the end.
-fn driven<const C: usize>() -> Vec<Lanes> {
+fn drive_face<const C: usize>() -> Vec<Lanes> {
     let operator = Operator::<C>::new(&setup(), &bone(), &mesh());
     let k = wavenumbers();
     let mut state = WaveState::default();
@@ -181,8 +181,8 @@ fn driven<const C: usize>() -> Vec<Lanes> {
 
 #[test]
 fn the_pressure_in_fluid_1_is_real_for_a_triclinic_bone() {
-    let complex = driven::<2>();
-    let real = driven::<1>();
+    let complex = drive_face::<2>();
+    let real = drive_face::<1>();
     let largest = real.iter().flat_map(|p| p.0).fold(0.0, |max: f64, p| max.max(p.abs()));
     for (node, &alone) in complex.chunks_exact(2).zip(&real) {
         for lane in 0..LANES {
@@ -202,7 +202,7 @@ fn steps_above_the_limit_grow_without_bound_and_those_below_do_not() {
     let mut state = WaveState::default();
     let limit = stability_limit::<Scalar, _>(&operator, 4900.0, &mut state);
     for (share, stable) in [(1.0, true), (1.05, false)] {
-        state.rest(&operator);
+        state.reset(&operator);
         state.now = noise(&operator, 5);
         for _ in 0..3000 {
             state.step::<Scalar, _>(&operator, k, [Lanes::ZERO; 3], share * limit);

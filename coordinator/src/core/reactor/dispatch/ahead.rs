@@ -1,13 +1,13 @@
 //! Parts of a search that are computed before the search comes to them.
 //!
 //! The search of a job asks for one point after another, and a single evaluation keeps a large fleet
-//! busy only for moments. Other groups and other starts are independent of it, so their points are
+//! busy only for moments. Other groups and other starts do not depend on that point, so theirs are
 //! evaluated at the same time. These evaluations are work like any other: their batches are charged to
 //! the client and audited. Only disputes and quarantined realizations wait until the search asks for
 //! the point, because they may end the job.
 //!
-//! [`refresh`] sees to it that a job with further parts always has something to send, and that no
-//! part begins before it is needed for that.
+//! [`refresh`] makes sure that a job with further parts always has something to send, and that a part
+//! begins only when nothing of the others waits to be sent.
 
 use osteon_common::parameters::Point;
 use osteon_search::same_point;
@@ -69,19 +69,19 @@ pub(crate) fn keep_if_awaited(job: &mut Job, record: &EvaluationRecord) {
     }
 }
 
-/// Takes in a complete evaluation of a branch, if `attempt` is one, and begins the next.
+/// Passes the evaluation of a branch to the branch if `attempt` is one and complete, and begins the next.
 pub(crate) fn settle(turn: &mut Turn, id: JobId, attempt: u64) {
     clearance::clear(turn, id, attempt);
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    let of_attempt = |it: &&mut FollowedBranch| {
+    let has_attempt = |it: &&mut FollowedBranch| {
         it.evaluation.as_ref().is_some_and(|evaluation| evaluation.attempt == attempt)
     };
-    let Some(part) = job.ahead.branches.iter_mut().find(of_attempt).map(|it| it.part) else {
+    let Some(part) = job.ahead.branches.iter_mut().find(has_attempt).map(|it| it.part) else {
         return;
     };
-    if job.ahead.take_in(part, turn.now) {
+    if job.ahead.pass_to_branch(part, turn.now) {
         begin(turn, id, part);
         refresh(turn, id);
     }
@@ -132,7 +132,6 @@ pub(crate) fn forget(turn: &mut Turn, id: JobId, host: &str) {
     batches::revoke_attempts(turn, id, &gone);
 }
 
-/// Drops everything.
 pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
@@ -144,7 +143,7 @@ pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
 
 /// Returns the number of realizations that the known parts of a search will need at least, beyond
 /// those of the evaluation it asked for: those that wait, and one evaluation for each further part.
-pub(crate) fn left(job: &Job) -> u64 {
+pub(crate) fn remaining_realizations(job: &Job) -> u64 {
     let waiting: u64 = job.ahead.evaluations().map(PendingEvaluation::queued).sum();
     let further = job.search.parts().saturating_sub(job.ahead.next_part);
     waiting + further * job.record.specification.monte_carlo.realizations
@@ -198,7 +197,7 @@ fn begin(turn: &mut Turn, id: JobId, part: u64) -> bool {
         let waits = !evaluation.queue.is_empty();
         job.ahead.branches[at].evaluation = Some(evaluation);
         // All of it may have been saved.
-        if !job.ahead.take_in(part, turn.now) {
+        if !job.ahead.pass_to_branch(part, turn.now) {
             return waits;
         }
     }

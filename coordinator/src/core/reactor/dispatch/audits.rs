@@ -42,20 +42,22 @@ fn audit_for(
     worker: WorkerId,
     name: &WorkerName,
 ) -> Option<(Audit, u64)> {
-    let of_others = |audit: &Audit| audit.by.host() != name.host();
-    let (attempt, at, audited) = state.jobs.get(&job)?.certain().find_map(|evaluation| {
-        let at = evaluation.audits.iter().position(of_others)?;
-        Some((evaluation.attempt, at, evaluation.audits.get(at)?.indices.count))
-    })?;
+    let is_of_other_host = |audit: &Audit| audit.by.host() != name.host();
+    let (attempt, at, audited) =
+        state.jobs.get(&job)?.certain_evaluations().find_map(|evaluation| {
+            let at = evaluation.audits.iter().position(is_of_other_host)?;
+            Some((evaluation.attempt, at, evaluation.audits.get(at)?.indices.count))
+        })?;
     let most = if schedule::next_job(state).is_some() {
         audited
     } else {
         let fleet = sizing::fleet_rate(state, job);
-        let all = state.jobs.get(&job)?.certain().flat_map(|evaluation| &evaluation.audits);
+        let all =
+            state.jobs.get(&job)?.certain_evaluations().flat_map(|evaluation| &evaluation.audits);
         let waiting = all.map(|audit| audit.indices.count).sum();
         sizing::audit_size(state.workers.get(&worker)?, job, fleet, (audited, waiting))
     };
-    let evaluation = state.jobs.get_mut(&job)?.certain_with_mut(attempt)?;
+    let evaluation = state.jobs.get_mut(&job)?.certain_evaluation_mut(attempt)?;
     evaluation.audits_out += 1;
     let audit = evaluation.audits.get_mut(at)?;
     let part = Audit { indices: audit.indices.take(most), ..audit.clone() };
@@ -76,12 +78,12 @@ fn dispute_for(state: &State, job: JobId, worker: WorkerId) -> Option<usize> {
         let asked = dispute.tie_breakers.iter().filter_map(|id| state.batches.get(id));
         let asked: Vec<&str> =
             asked.filter_map(|batch| Some(state.workers.get(&batch.worker)?.name.host())).collect();
-        let may = |worker: &&AttachedWorker| {
+        let may_vote = |worker: &&AttachedWorker| {
             let host = worker.name.host();
             !worker.draining && !dispute.has_vote_of(host) && !asked.contains(&host)
         };
-        let best = state.workers.values().filter(may).map(reputation).min();
-        votes::are_lacking(state, dispute) && may(&worker) && best == Some(reputation(worker))
+        let best = state.workers.values().filter(may_vote).map(reputation).min();
+        votes::are_lacking(state, dispute) && may_vote(&worker) && best == Some(reputation(worker))
     };
     evaluation.disputes.iter().position(is_for)
 }

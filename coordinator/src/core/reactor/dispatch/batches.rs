@@ -53,7 +53,6 @@ pub(crate) fn charge(state: &mut State, id: BatchId) {
     state.shares.charge(&job.record.client, batch.charged);
 }
 
-/// Revokes a batch.
 pub(crate) fn revoke(turn: &mut Turn, batch: BatchId) {
     if let Some(revoked) = turn.state.settle(batch) {
         turn.effects.push(Effect::Revoke { worker: revoked.worker, batch });

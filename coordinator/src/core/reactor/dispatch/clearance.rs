@@ -39,7 +39,8 @@ pub(crate) fn unproven_attempts(state: &State, job: JobId, now: Duration) -> BTr
     let voters = proof_voters(state, &job.setup, now);
     let confirms =
         |name: &WorkerName| proofs.is_given_by(name) && proofs.ballot.confirms(name.host(), voters);
-    let unproven = job.certain().filter(|evaluation| !evaluation.workers.iter().all(confirms));
+    let unproven =
+        job.certain_evaluations().filter(|evaluation| !evaluation.workers.iter().all(confirms));
     unproven.map(|evaluation| evaluation.attempt).collect()
 }
 
@@ -56,7 +57,8 @@ enum Need {
 
 /// Decides whether the results of a complete evaluation may count, and asks for what is missing.
 pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
-    let found = turn.state.jobs.get(&id).and_then(|job| Some((job, job.certain_with(attempt)?)));
+    let found =
+        turn.state.jobs.get(&id).and_then(|job| Some((job, job.certain_evaluation(attempt)?)));
     let Some((job, evaluation)) = found else {
         return;
     };
@@ -69,7 +71,7 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
     let names = evaluation.workers.iter().enumerate();
     let needs: Vec<(usize, Need)> = names
         .map(|(place, name)| {
-            (place, need(state, (evaluation, place), name, (&setup, voters), turn.now))
+            (place, clearance_need(state, (evaluation, place), name, (&setup, voters), turn.now))
         })
         .collect();
     let mut is_cleared = true;
@@ -85,7 +87,7 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
-    let Some(evaluation) = job.certain_with_mut(attempt) else {
+    let Some(evaluation) = job.certain_evaluation_mut(attempt) else {
         return;
     };
     for place in audited {
@@ -98,12 +100,13 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
 }
 
 /// Queues an audit of one realization of the last answer of each worker, so that a machine that has broken
-/// meanwhile is found before the evaluation counts. Where that were more than the fraction of the realizations
-/// that is audited, as with many workers, it is found by its next audit.
+/// meanwhile is found before the evaluation counts. With so many workers that these would be more than the
+/// fraction of the realizations that is audited, none is queued, and the machine is found by its next audit.
 fn audit_last_answers(turn: &mut Turn, id: JobId, attempt: u64) {
     let (key, fraction) = (turn.state.config.audit_key, turn.state.config.audit_fraction);
     let state = &*turn.state;
-    let Some(evaluation) = state.jobs.get(&id).and_then(|job| job.certain_with(attempt)) else {
+    let Some(evaluation) = state.jobs.get(&id).and_then(|job| job.certain_evaluation(attempt))
+    else {
         return;
     };
     if evaluation.workers.len() as f64 > fraction * evaluation.realizations() as f64 {
@@ -116,7 +119,7 @@ fn audit_last_answers(turn: &mut Turn, id: JobId, attempt: u64) {
     let due: Vec<(usize, WorkerName)> = due.map(|(place, name)| (place, name.clone())).collect();
     for (place, name) in due {
         let job = turn.state.jobs.get_mut(&id);
-        if let Some(evaluation) = job.and_then(|job| job.certain_with_mut(attempt)) {
+        if let Some(evaluation) = job.and_then(|job| job.certain_evaluation_mut(attempt)) {
             audit_last(evaluation, place, Some(&key));
             turn.state.count_checked(&name, 1);
         }
@@ -124,7 +127,7 @@ fn audit_last_answers(turn: &mut Turn, id: JobId, attempt: u64) {
 }
 
 /// Returns what the results of the worker at a place of an evaluation need.
-fn need(
+fn clearance_need(
     state: &State,
     (evaluation, place): (&PendingEvaluation, usize),
     name: &WorkerName,
@@ -166,7 +169,7 @@ fn audit_last(evaluation: &mut PendingEvaluation, place: usize, one: Option<&aud
     evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
 }
 
-/// Puts workers on probation that do not give their proof of a setup, and asks further hosts where no answer has a
+/// Puts workers on probation that do not give their proof of a setup, and asks further hosts if no answer has a
 /// majority.
 pub(crate) fn look_for_majority(turn: &mut Turn, setup: &SetupKey) {
     let Some(proofs) = turn.state.proofs.for_setup(setup) else {
@@ -186,7 +189,7 @@ pub(crate) fn look_for_majority(turn: &mut Turn, setup: &SetupKey) {
     ask_for_majority(turn, setup);
 }
 
-/// Asks further hosts where those asked have no majority. Notes since when there is none.
+/// Asks further hosts if no answer of those asked has a majority, and notes since when that is so.
 fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) {
     let Some(proofs) = turn.state.proofs.for_setup(setup) else {
         return;
@@ -202,7 +205,8 @@ fn ask_for_majority(turn: &mut Turn, setup: &SetupKey) {
     if voted < 2 || voters > voted || lacks == 0 {
         return;
     }
-    if let Some(job) = turn.state.active_job_of(setup) {
+    let job = turn.state.active_jobs_of(setup).next();
+    if let Some(job) = job {
         proofs::ask_further(turn, job, voted + lacks);
     }
 }

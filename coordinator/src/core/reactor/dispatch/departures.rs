@@ -30,7 +30,7 @@ pub(crate) fn depart(turn: &mut Turn, worker: WorkerId, why: Departure) -> Optio
             turn.state.hosts.remove(gone.name.host());
         }
     }
-    turn.state.came_or_went(worker);
+    turn.state.follow_fleet_change(worker);
     if turn.state.workers.is_empty() {
         turn.state.no_worker_since = turn.now;
     }

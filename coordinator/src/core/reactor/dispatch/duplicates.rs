@@ -14,11 +14,11 @@ use crate::core::state::State;
 /// been out longest.
 pub(crate) fn duplicate_late_batches(turn: &mut Turn) {
     let now = turn.now;
-    let late = |state: &State, batch: &Batch| {
-        now.saturating_sub(batch.sent) >= LATE_FACTOR * eta::expected(state, batch)
+    let is_late = |state: &State, batch: &Batch| {
+        now.saturating_sub(batch.sent) >= LATE_FACTOR * eta::expected_time(state, batch)
     };
     let idle = |place: &ServicePlace| place.held == 0;
-    duplicate(turn, idle, late);
+    duplicate(turn, idle, is_late);
 }
 
 /// Sends each worker that holds nothing a duplicate of the batch that has been out longest.
@@ -27,21 +27,21 @@ pub(crate) fn duplicate_slow_batches(turn: &mut Turn) {
 }
 
 /// Sends each worker that is `idle` a duplicate of the batch that has been out longest among those
-/// `worth` it. Batches younger than half the target time are about to be answered and are not
-/// duplicated; nor are those whose answers may be on their way, because all answers are late.
+/// `worth` it. Young batches are not duplicated, because they are about to be answered: those out for
+/// less than half the target time, and longer if all answers are late.
 fn duplicate(
     turn: &mut Turn,
     idle: impl Fn(&ServicePlace) -> bool,
     worth: impl Fn(&State, &Batch) -> bool,
 ) {
     let patience = turn.state.config.batch_target / 2 + LATE_FACTOR * turn.state.delay.mean();
-    let old = |batch: &Batch, now: Duration| now.saturating_sub(batch.sent) >= patience;
+    let is_old = |batch: &Batch, now: Duration| now.saturating_sub(batch.sent) >= patience;
     loop {
         let (state, now) = (&*turn.state, turn.now);
-        if !open(state).next().is_some_and(|(_, oldest)| old(oldest, now)) {
+        if !open_batches(state).next().is_some_and(|(_, oldest)| is_old(oldest, now)) {
             return;
         }
-        // Those that hold least come first; the duplicate makes the worker busy.
+        // The worker that holds least comes first, and its duplicate makes it busy.
         let first = state.order.iter().next();
         let sound = |place: &ServicePlace| {
             state.workers.get(&place.worker).is_some_and(|worker| !state.may_be_silent(worker))
@@ -50,12 +50,12 @@ fn duplicate(
             return;
         };
         let is_sound = sound(&idle);
-        // This walks over all batches, so it is done only when a worker is idle.
-        // Only a worker that answers gets a copy of what others may not answer.
+        // This walks over all batches, so it is done only when a worker is idle. A batch with duplicates
+        // is out at workers that may be silent; only one that surely answers gets a further copy.
         let is_worth = |(_, batch): &(BatchId, &Batch)| {
-            old(batch, now) && worth(state, batch) && (is_sound || batch.duplicates.is_empty())
+            is_old(batch, now) && worth(state, batch) && (is_sound || batch.duplicates.is_empty())
         };
-        let Some((slowest, _)) = open(state).find(is_worth) else {
+        let Some((slowest, _)) = open_batches(state).find(is_worth) else {
             return;
         };
         if send(turn, slowest, idle.worker).is_none() {
@@ -64,9 +64,9 @@ fn duplicate(
     }
 }
 
-/// Returns the batches that may be duplicated before they are overdue, in the order they were sent: those
-/// without duplicates, and those of which all copies are out at workers that may be silent.
-fn open(state: &State) -> impl Iterator<Item = (BatchId, &Batch)> {
+/// Returns the batches that may be duplicated before they are overdue, in the order in which they were
+/// sent: those without duplicates, and those of which all copies are at workers that may be silent.
+fn open_batches(state: &State) -> impl Iterator<Item = (BatchId, &Batch)> {
     let batches = state.batches.iter().map(|(id, batch)| (*id, batch));
     batches.filter(|(id, batch)| {
         batch.purpose == Purpose::Fill

@@ -1,8 +1,8 @@
 //! Speculative batches for idle slots, and the cases in which these slots stay idle instead.
 //!
-//! A realization that has begun is not interrupted, so a slot that will soon be needed stays idle
-//! until then: when the evaluation of the same job is about to be complete, since another point may
-//! be likelier afterwards, and when another job is about to need the slot.
+//! A realization that has begun is not interrupted, so a slot stays idle if it will soon be needed for
+//! something better. That is so if the evaluation of the same job is about to be complete, because
+//! another point may be likelier afterwards, or if another job is about to need the slot.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -25,75 +25,79 @@ use crate::core::state::{AttachedWorker, State};
 /// ETA of the last batch of each evaluation that a search waits for.
 type Etas = BTreeMap<JobId, Duration>;
 
-/// Sends speculative batches to the workers with idle slots, as many as cost the coordinator no time that
-/// the search waits for.
+/// Sends speculative batches to the workers with idle slots, but no more than the coordinator can serve
+/// without delaying the answers that a search waits for.
 pub(crate) fn dispatch(turn: &mut Turn) {
-    if next(turn.state).is_none() {
+    if choose_point(turn.state).is_none() {
         return;
     }
     let speculative = |batch: &&Batch| batch.purpose == Purpose::Speculative;
     let mut out = turn.state.batches.values().filter(speculative).count();
-    // Those that hold a speculative batch get no other.
-    let without = (0..BATCHES_IN_FLIGHT_MAX).flat_map(|held| turn.state.order.holding(held));
-    let idle = without.filter_map(|id| Some((id, spare(turn.state, turn.state.workers.get(&id)?))));
+    // A worker that holds a speculative batch gets no other.
+    let without_speculative =
+        (0..BATCHES_IN_FLIGHT_MAX).flat_map(|held| turn.state.order.holding(held));
+    let idle = without_speculative
+        .filter_map(|id| Some((id, spare_slots(turn.state, turn.state.workers.get(&id)?))));
     let idle: Vec<(WorkerId, u64)> =
         idle.filter(|(_, slots)| *slots > 0).take(IDLE_AT_ONCE).collect();
     let mut slots: u64 = idle.iter().map(|(_, slots)| slots).sum();
     let etas = eta::etas(turn.state);
-    let mut wanted = next(turn.state);
+    let mut wanted = choose_point(turn.state);
     for (worker, spare) in idle {
         let Some((job, point)) = wanted else {
             return;
         };
-        if !waits(turn.state, job, &point, worker, slots, &etas, turn.now) {
-            let size = size(turn.state, job, &point, worker);
-            if out >= out_max(turn.state, job, worker, size) {
+        if !must_stay_idle(turn.state, job, &point, worker, slots, &etas, turn.now) {
+            let size = batch_size(turn.state, job, &point, worker);
+            if out >= batches_out_max(turn.state, job, worker, size) {
                 return;
             }
             send(turn, job, point, worker, size);
             out += 1;
             slots -= spare;
-            wanted = next(turn.state);
+            wanted = choose_point(turn.state);
         }
     }
 }
 
-/// Returns the number of speculative batches of this size that may be out at a time: as many as the
-/// coordinator serves while one is computed. More of them would delay the answers that the search waits for.
-fn out_max(state: &State, id: JobId, worker: WorkerId, size: u64) -> usize {
+/// Returns how many speculative batches of this size may be out at a time: as many as the coordinator
+/// serves while one is computed. More would delay the answers that the search waits for.
+fn batches_out_max(state: &State, id: JobId, worker: WorkerId, size: u64) -> usize {
     let rate = state.workers.get(&worker).and_then(|it| it.rates.get(&id));
     rate.map_or(SPECULATIVE_BATCHES_MIN, |rate| {
-        sizing::served_within(size as f64 / rate).max(SPECULATIVE_BATCHES_MIN)
+        sizing::batches_served_within(size as f64 / rate).max(SPECULATIVE_BATCHES_MIN)
     })
 }
 
-/// Chooses the point to compute speculatively next, and its job. First come points that a search
-/// will certainly ask for, once a record is durable. Then come points by their rank among the
-/// candidates of their job; among equal ranks the order is that of other work.
-fn next(state: &State) -> Option<(JobId, Point)> {
-    let of_job = |id: &JobId| {
+/// Chooses the point to compute speculatively next, and its job. Points that a search will certainly
+/// ask for as soon as a record is durable come first, the others by their rank among the candidates of
+/// their job. Points of equal rank come in the order in which their jobs are served with other work.
+fn choose_point(state: &State) -> Option<(JobId, Point)> {
+    let rank_job = |id: &JobId| {
         let job = state.jobs.get(id)?;
         let has_room = || {
             let more = job.record.specification.monte_carlo.realizations;
             state.realizations() + more <= state.config.active_realizations_max
         };
-        let place =
-            job.speculation.candidates.iter().position(|at| match job.speculation.at(at) {
+        let place = job.speculation.candidates.iter().position(|at| {
+            match job.speculation.evaluation_at(at) {
                 Some(begun) => !begun.queue.is_empty() && !begun.has_crashed_worker,
                 None => !job.ahead.has(at) && has_room(),
-            })?;
+            }
+        })?;
         let certain = place == 0 && matches!(job.stage, Stage::StoringEvaluation { .. });
-        let had = state.shares.used(&job.record.client);
+        let had = state.shares.computing_time(&job.record.client);
         Some((!certain, place, had, Reverse(job.record.priority), *id))
     };
-    let (_, place, .., id) = state.active.iter().filter_map(of_job).min()?;
+    let (_, place, .., id) = state.active.iter().filter_map(rank_job).min()?;
     let point = state.jobs.get(&id)?.speculation.candidates.get(place)?;
     Some((id, *point))
 }
 
-/// Returns whether the idle slots of a worker should stay idle; `slots` is the number of idle slots
-/// of all workers that are looked at.
-fn waits(
+/// Returns whether the idle slots of a worker must stay idle, because its job or another will need them
+/// before a batch of `point` is computed. `slots` is the number of idle slots of all workers that are
+/// looked at.
+fn must_stay_idle(
     state: &State,
     id: JobId,
     point: &Point,
@@ -105,26 +109,26 @@ fn waits(
     let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
         return true;
     };
-    let spare = spare(state, attached);
-    // A realization that has begun is not interrupted.
-    let begun = spare.min(queued(job, point)) as f64;
+    let spare = spare_slots(state, attached);
+    // So many realizations begin at once, and none of them is interrupted.
+    let begun = spare.min(queued_realizations(job, point)) as f64;
     let seconds = attached.rates.get(&id).map_or(0.0, |rate| begun / rate);
     let takes = fairness::slot_time(seconds, 1);
-    let soon = |eta: &Duration| now < *eta + takes / 2 && *eta < now + takes / 2;
-    etas.get(&id).is_some_and(soon)
-        || slots < spare + wanted_by_others(state, id, now + takes, etas)
+    let is_soon = |eta: &Duration| now < *eta + takes / 2 && *eta < now + takes / 2;
+    etas.get(&id).is_some_and(is_soon)
+        || slots < spare + slots_wanted_by_others(state, id, now + takes, etas)
 }
 
 /// Returns the number of realizations of a point that nobody computes yet.
-fn queued(job: &Job, point: &Point) -> u64 {
+fn queued_realizations(job: &Job, point: &Point) -> u64 {
     let realizations = job.record.specification.monte_carlo.realizations;
-    job.speculation.at(point).map_or(realizations, PendingEvaluation::queued)
+    job.speculation.evaluation_at(point).map_or(realizations, PendingEvaluation::queued)
 }
 
 /// Returns the number of slots that jobs other than `but` will need before `until`, beyond those
 /// they have.
-fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> u64 {
-    let wanted = |id: &JobId| {
+fn slots_wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> u64 {
+    let slots_wanted = |id: &JobId| {
         let job = state.jobs.get(id)?;
         let specification = &job.record.specification;
         let realizations = specification.monte_carlo.realizations;
@@ -138,7 +142,7 @@ fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> 
                 let soon = etas.get(id).is_some_and(|eta| *eta < until);
                 soon.then_some(evaluation.filled())
             }
-            Stage::StoringEvaluation { .. } if has_next(job) => None,
+            Stage::StoringEvaluation { .. } if next_point_is_sent(job) => None,
             Stage::Completing(_)
             | Stage::StoringEvaluation { .. }
             | Stage::StoringPrepared { .. }
@@ -146,23 +150,24 @@ fn wanted_by_others(state: &State, but: JobId, until: Duration, etas: &Etas) -> 
             Stage::StoringSubmission | Stage::Waiting | Stage::StoringEnd(_) => None,
         }
     };
-    state.active.iter().filter(|id| **id != but).filter_map(wanted).sum()
+    state.active.iter().filter(|id| **id != but).filter_map(slots_wanted).sum()
 }
 
 /// Returns whether every batch of the point that a job asks for next, when its record is durable,
 /// has been sent.
-fn has_next(job: &Job) -> bool {
-    let next = job.speculation.candidates.first().and_then(|next| job.speculation.at(next));
+fn next_point_is_sent(job: &Job) -> bool {
+    let next =
+        job.speculation.candidates.first().and_then(|next| job.speculation.evaluation_at(next));
     next.is_some_and(|next| next.queue.is_empty())
 }
 
-/// Returns the size of a batch of a point for the idle slots of a worker.
-fn size(state: &mut State, id: JobId, point: &Point, worker: WorkerId) -> u64 {
+/// Returns the number of realizations of a point that the idle slots of a worker get.
+fn batch_size(state: &mut State, id: JobId, point: &Point, worker: WorkerId) -> u64 {
     let fleet = sizing::fleet_rate(state, id);
     let (Some(job), Some(attached)) = (state.jobs.get(&id), state.workers.get(&worker)) else {
         return 0;
     };
-    let (queued, spare) = (queued(job, point), spare(state, attached));
+    let (queued, spare) = (queued_realizations(job, point), spare_slots(state, attached));
     match batches::realizations_held(state, attached) {
         0 => sizing::batch_size(state, attached, id, fleet, (queued, 0)).max(spare.min(queued)),
         _ => spare,
@@ -171,7 +176,7 @@ fn size(state: &mut State, id: JobId, point: &Point, worker: WorkerId) -> u64 {
 
 /// Sends a batch of a point to the idle slots of a worker.
 fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId, size: u64) {
-    let Some((attempt, indices)) = take(turn.state, id, point, size) else {
+    let Some((attempt, indices)) = take_indices(turn.state, id, point, size) else {
         return;
     };
     let assignment = Assignment { job: id, attempt, indices };
@@ -180,10 +185,10 @@ fn send(turn: &mut Turn, id: JobId, point: Point, worker: WorkerId, size: u64) {
 
 /// Takes indices of a point, beginning its evaluation if necessary; returns them with the number of
 /// the attempt.
-fn take(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, Indices)> {
+fn take_indices(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, Indices)> {
     let attempt = state.new_attempt();
     let job = state.jobs.get_mut(&id)?;
-    if job.speculation.at(&point).is_none() {
+    if job.speculation.evaluation_at(&point).is_none() {
         // The lowest number that it may get. The number only decides which batches are audited.
         let number = job.search.evaluations() + 1;
         let realizations = job.record.specification.monte_carlo.realizations;
@@ -194,12 +199,12 @@ fn take(state: &mut State, id: JobId, point: Point, size: u64) -> Option<(u64, I
             realizations,
         ));
     }
-    let evaluation = job.speculation.at_mut(&point)?;
+    let evaluation = job.speculation.evaluation_at_mut(&point)?;
     Some((evaluation.attempt, evaluation.take(size)?))
 }
 
 /// Returns the number of slots of a worker that no other work needs.
-fn spare(state: &State, worker: &AttachedWorker) -> u64 {
+fn spare_slots(state: &State, worker: &AttachedWorker) -> u64 {
     let holds = |purpose| state.held_for(worker, purpose).next().is_some();
     let full = worker.in_flight.len() >= BATCHES_IN_FLIGHT_MAX;
     let failing = state.is_failing(worker.name.host());

@@ -22,7 +22,7 @@ pub(crate) fn replace(turn: &mut Turn, (id, point): (JobId, Point), index: u64, 
     for batch in out.into_values() {
         batches::revoke(turn, batch);
     }
-    turn.state.proofs.replace(setup, (input, votes.about(index)), turn.now);
+    turn.state.proofs.replace(setup, (input, votes.for_index(index)), turn.now);
     let mut waiting = Vec::new();
     for (worker, attached) in &mut turn.state.workers {
         attached.proven.remove(&setup);

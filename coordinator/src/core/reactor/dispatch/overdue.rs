@@ -3,8 +3,8 @@
 //! A worker may send heartbeats and never answer. So another worker gets a duplicate of an overdue
 //! batch, and the first answer counts; if the duplicate becomes overdue too, a third worker gets
 //! one. Each duplicate may take twice as long as the one before, so that realizations that are slow
-//! everywhere are computed only a few times. Where other work waits, a job has one such duplicate
-//! out at a time: its answer shows how long the others should take.
+//! everywhere are computed only a few times. While other work waits, a job has only one such duplicate
+//! out at a time, the scout: its answer shows how long the other batches should take.
 //!
 //! A worker that misses batches in a row is on probation until it answers one (`probation.rs`).
 
@@ -25,10 +25,10 @@ use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, State};
 use crate::core::worker_name::WorkerName;
 
-/// Finds batches that are overdue.
+/// Lists the overdue batches, and acts on those that nobody else can answer.
 pub(crate) fn tick(turn: &mut Turn) {
     if turn.state.probation.forget(turn.now) {
-        probation_changed(turn.state);
+        follow_probation(turn.state);
     }
     let late = turn.state.batches.keys().filter(|id| is_overdue(turn.state, **id, turn.now));
     let late: Vec<BatchId> = late.copied().collect();
@@ -49,14 +49,13 @@ pub(crate) fn tick(turn: &mut Turn) {
     }
 }
 
-/// Returns whether a batch is overdue.
 pub(crate) fn is_overdue(state: &State, id: BatchId, now: Duration) -> bool {
     state.batches.get(&id).is_some_and(|batch| {
         let waited = now.saturating_sub(batch.begun);
         let factor = 2_u32.saturating_pow(batch.retries);
         // Most batches are young; the expected time is computed only for the others.
         waited >= OVERDUE_MIN * factor
-            && waited >= expected(state, id).unwrap_or_default() * OVERDUE_FACTOR * factor
+            && waited >= expected_time(state, id).unwrap_or_default() * OVERDUE_FACTOR * factor
     })
 }
 
@@ -70,17 +69,17 @@ pub(crate) fn is_waited_for(state: &State, id: BatchId, now: Duration) -> bool {
 /// Returns the expected time of a batch, together with those that its worker was sent before it, by
 /// the rate of the worker or the pace of the job, whichever is slower; `None` if the pace of the
 /// job is unknown.
-fn expected(state: &State, id: BatchId) -> Option<Duration> {
+fn expected_time(state: &State, id: BatchId) -> Option<Duration> {
     let worker = state.workers.get(&state.batches.get(&id)?.worker)?;
-    let alone = |id: &BatchId| {
+    let own_time = |id: &BatchId| {
         let Assignment { job, indices, .. } = state.batches.get(id)?.assignment;
-        let pace = state.jobs.get(&job)?.pace.expected(indices.count, worker.hello.slots);
+        let pace = state.jobs.get(&job)?.pace.expected_time(indices.count, worker.hello.slots);
         let rate = worker.rates.get(&job);
         pace.max(rate.map(|rate| fairness::slot_time(indices.count as f64 / rate, 1)))
     };
     let before = worker.in_flight.iter().filter(|held| **held < id);
-    let before: Duration = before.filter_map(alone).sum();
-    Some(before + alone(&id)?)
+    let before: Duration = before.filter_map(own_time).sum();
+    Some(before + own_time(&id)?)
 }
 
 /// Puts a worker on probation that has held an overdue batch for too long.
@@ -89,7 +88,7 @@ fn suspect_silent(state: &mut State, id: BatchId, now: Duration) {
         return;
     };
     // Before the first answer of the job, its realizations may simply take this long.
-    let long = now.saturating_sub(batch.begun) >= SILENT_MAX && expected(state, id).is_some();
+    let long = now.saturating_sub(batch.begun) >= SILENT_MAX && expected_time(state, id).is_some();
     if let Some(worker) =
         state.workers.get(&batch.worker).filter(|worker| long && state.is_sound(worker))
     {
@@ -113,13 +112,13 @@ fn give_up_audit(turn: &mut Turn, id: BatchId) {
     let mut given_up = batch.duplicates.clone();
     given_up.push(id);
     for id in given_up {
-        missed(turn.state, id, turn.now);
+        count_missed(turn.state, id, turn.now);
         batches::revoke(turn, id);
     }
 }
 
-/// Sends duplicates of overdue batches, before any other work is sent. Adds workers to `kept` that
-/// must not receive further batches, so that they soon hold none.
+/// Sends duplicates of overdue batches, before any other work is sent. Workers that get no further
+/// batches, so that they are soon free for an exclusive duplicate, are added to `kept`.
 pub(crate) fn dispatch(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
     if turn.state.overdue.is_empty() {
         return;
@@ -157,7 +156,7 @@ pub(crate) fn dispatch(turn: &mut Turn, kept: &mut BTreeSet<WorkerId>) {
     }
 }
 
-/// Returns whether a job has a duplicate of an overdue batch out that is not overdue itself.
+/// Returns whether a scout of a job is out: a duplicate of an overdue batch that is not overdue itself.
 fn has_scout(state: &State, job: JobId, now: Duration) -> bool {
     let newest_overdue_duplicate =
         state.jobs.get(&job).and_then(|job| job.newest_overdue_duplicate);
@@ -168,7 +167,7 @@ fn has_scout(state: &State, job: JobId, now: Duration) -> bool {
 }
 
 fn holds_anything(state: &State, worker: WorkerId) -> bool {
-    state.workers.get(&worker).is_none_or(|worker| state.held(worker) > 0)
+    state.workers.get(&worker).is_none_or(|worker| state.batches_held(worker) > 0)
 }
 
 /// Chooses which of the workers in `free` gets a duplicate of a batch.
@@ -182,7 +181,7 @@ fn choose_worker(
         let doubtful = state.may_be_silent(worker);
         let on_probation = !state.is_sound(worker);
         let of_holder = is_of_holder(state, batch, worker);
-        (on_probation, doubtful, of_holder, state.held(worker), *id)
+        (on_probation, doubtful, of_holder, state.batches_held(worker), *id)
     };
     // Who has never answered anything gets no copy while another worker is there that has, busy or not.
     let answers = |worker: &AttachedWorker| {
@@ -208,7 +207,7 @@ fn choose_exclusive_worker(state: &State, id: BatchId, now: Duration) -> Option<
     let rank =
         |(other, worker): &(&WorkerId, &AttachedWorker)| -> (Reputation, bool, usize, WorkerId) {
             let reputation = poison::reputation(state, worker, crashes);
-            (reputation, is_of_holder(state, id, worker), state.held(worker), **other)
+            (reputation, is_of_holder(state, id, worker), state.batches_held(worker), **other)
         };
     let risks_failing = risks_failing(state, batch, crashes, now);
     let fit = |worker: &AttachedWorker| {
@@ -218,10 +217,10 @@ fn choose_exclusive_worker(state: &State, id: BatchId, now: Duration) -> Option<
     fit.min_by_key(rank).map(|(chosen, _)| *chosen)
 }
 
-/// Returns whether an exclusive batch may go to a host whose workers are lost whatever they hold: the
-/// holder has had the time of a lease to answer, and its host may be the worse one. After each loss
-/// since then the next wait is twice as long, and the last loss that would make the realization
-/// poison is not risked here, so that a bad node does not fail a job because another one is silent.
+/// Returns whether an exclusive batch may go to a host whose workers are lost whatever they hold. It may
+/// once the holder has had the time of a lease to answer, because the holder's host may be even worse.
+/// Each loss since then doubles the wait. The last loss, which would make the realization poison, is not
+/// risked here, so that a bad node does not fail a job because another one is silent.
 fn risks_failing(state: &State, batch: &Batch, crashes: &Crashes, now: Duration) -> bool {
     let lost = crashes.count_after(batch.begun);
     let since = crashes.last().unwrap_or_default().max(batch.begun);
@@ -229,17 +228,17 @@ fn risks_failing(state: &State, batch: &Batch, crashes: &Crashes, now: Duration)
     now.saturating_sub(since) >= wait && !crashes.permit_only_one_more()
 }
 
-/// Returns whether a worker shall get a duplicate of a batch: it is eligible, and holds no overdue
-/// batch itself.
+/// Returns whether a worker may get a duplicate of a batch: it is eligible, and holds no overdue batch
+/// itself.
 fn is_fit(state: &State, id: BatchId, worker: &AttachedWorker, now: Duration) -> bool {
-    let late = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
-    let trusted = state.is_sound(worker) || is_tried(state, id, worker, now);
-    trusted && may_have(state, id, &worker.name) && !late()
+    let has_overdue = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
+    let trusted = state.is_sound(worker) || may_be_tried(state, id, worker, now);
+    trusted && may_have(state, id, &worker.name) && !has_overdue()
 }
 
-/// Returns whether a worker on probation is tried with a duplicate of a batch. Audits are not used
-/// for that.
-fn is_tried(state: &State, id: BatchId, worker: &AttachedWorker, now: Duration) -> bool {
+/// Returns whether a worker on probation may be tried with a duplicate of this batch. Audits are not
+/// used for that.
+fn may_be_tried(state: &State, id: BatchId, worker: &AttachedWorker, now: Duration) -> bool {
     let purpose = state.batches.get(&id).map(|batch| batch.purpose);
     !worker.draining
         && worker.in_flight.is_empty()
@@ -268,7 +267,7 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
     let Some(evaluation) = state.evaluation_of(&batch.assignment) else {
         return false;
     };
-    let about = |it: &&Dispute| it.tie_breakers.contains(&id);
+    let has_tie_breaker = |it: &&Dispute| it.tie_breakers.contains(&id);
     let in_question = match batch.purpose {
         Purpose::Fill | Purpose::Exclusive | Purpose::Speculative => false,
         Purpose::Proof => true,
@@ -276,9 +275,11 @@ fn may_have(state: &State, id: BatchId, name: &WorkerName) -> bool {
             let by = evaluation.owner(batch.assignment.indices.first);
             by.is_none_or(|by| by.host() == name.host())
         }
-        Purpose::TieBreak => {
-            evaluation.disputes.iter().find(about).is_none_or(|it| it.has_vote_of(name.host()))
-        }
+        Purpose::TieBreak => evaluation
+            .disputes
+            .iter()
+            .find(has_tie_breaker)
+            .is_none_or(|it| it.has_vote_of(name.host())),
     };
     let is_check = !batch.purpose.fills();
     let in_common =
@@ -321,14 +322,14 @@ fn send(turn: &mut Turn, id: BatchId, to: WorkerId) {
     }
 }
 
-/// Counts a batch as missed if its worker should have answered it long ago. Called when it is
-/// revoked because another worker has answered it, or because it is no longer needed.
-pub(crate) fn missed(state: &mut State, id: BatchId, now: Duration) {
+/// Counts a batch as missed if its worker should have answered it long ago. Called when the batch is
+/// revoked, because another worker has answered it or because it is no longer needed.
+pub(crate) fn count_missed(state: &mut State, id: BatchId, now: Duration) {
     let Some(batch) = state.batches.get(&id) else {
         return;
     };
     let waited = now.saturating_sub(batch.begun);
-    let expected = expected(state, id).unwrap_or_default();
+    let expected = expected_time(state, id).unwrap_or_default();
     if waited < (state.config.batch_target / 2).max(expected * OVERDUE_FACTOR) {
         return;
     }
@@ -352,14 +353,14 @@ pub(crate) fn missed(state: &mut State, id: BatchId, now: Duration) {
 /// reason for its probation.
 pub(crate) fn begin_probation(state: &mut State, name: &WorkerName, sent: Duration, now: Duration) {
     if state.probation.miss(name, sent, now) {
-        probation_changed(state);
+        follow_probation(state);
         tracing::warn!(worker = %name, "this worker gives signs of life and does not answer what it \
             holds; until it does it gets one realization at a time");
     }
 }
 
 /// Records that a worker has answered a batch that it holds.
-pub(crate) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now: Duration) {
+pub(crate) fn note_answer(state: &mut State, worker: WorkerId, batch: BatchId, now: Duration) {
     let Some(worker) = state.workers.get_mut(&worker) else {
         return;
     };
@@ -374,12 +375,12 @@ pub(crate) fn answered(state: &mut State, worker: WorkerId, batch: BatchId, now:
         }
     }
     if ended {
-        probation_changed(state);
+        follow_probation(state);
     }
 }
 
-/// Follows a change of the probations, which is rare.
-pub(crate) fn probation_changed(state: &mut State) {
+/// Updates what depends on which workers are on probation. That changes rarely.
+pub(crate) fn follow_probation(state: &mut State) {
     state.reorder_all();
     state.fleet_changes += 1;
 }

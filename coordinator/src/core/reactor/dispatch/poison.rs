@@ -1,10 +1,10 @@
 //! Quarantined realizations: those that were alone in a batch of a lost worker. This file decides
 //! which worker gets them, and when so many workers crashed over one that it is poison.
 //!
-//! A bad node that has just come back holds nothing, so being idle is no evidence for a worker: a
-//! quarantined realization goes to the worker with the best reputation, and waits for it. One over
-//! which a worker was lost goes to the worker that has been attached longest among these, so that a
-//! node that comes and goes does not get it while another worker is there.
+//! A bad node that has just come back holds nothing, so an idle worker is not for that reason a good one:
+//! a quarantined realization goes to a worker with the best reputation, and waits for it. If a worker was
+//! lost over the realization, it goes to the one of these that has been attached longest, so that a node
+//! that comes and goes does not get it while another worker is there.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -37,8 +37,8 @@ pub(crate) fn dispatch(turn: &mut Turn) -> BTreeSet<WorkerId> {
     let mut kept = BTreeSet::new();
     let active: Vec<JobId> = turn.state.active.iter().copied().collect();
     for job in active {
-        while let Some((index, worker)) = next(turn.state, job, turn.now) {
-            let holds = |worker: &AttachedWorker| turn.state.held(worker) > 0;
+        while let Some((index, worker)) = choose_quarantined(turn.state, job, turn.now) {
+            let holds = |worker: &AttachedWorker| turn.state.batches_held(worker) > 0;
             if turn.state.workers.get(&worker).is_none_or(holds) {
                 kept.insert(worker);
                 break;
@@ -51,13 +51,13 @@ pub(crate) fn dispatch(turn: &mut Turn) -> BTreeSet<WorkerId> {
 }
 
 /// Chooses the next quarantined realization of a job that may be sent, and its worker.
-fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
+fn choose_quarantined(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let crashes = |index: &u64| evaluation.crashes.get(index);
-    let open = |index: &&u64| {
+    let is_open = |index: &&u64| {
         crashes(index).is_none_or(|crashes| !crash_limit_reached(state, crashes, |_| true))
     };
-    let index = evaluation.quarantine.iter().find(open)?;
+    let index = evaluation.quarantine.iter().find(is_open)?;
     let nobody = Crashes::default();
     let crashes = crashes(index).unwrap_or(&nobody);
     Some((*index, choose_worker(state, crashes, now)?))
@@ -67,7 +67,7 @@ fn next(state: &State, job: JobId, now: Duration) -> Option<(u64, WorkerId)> {
 /// that has not answered anything yet must first answer other work, if there is any.
 fn choose_worker(state: &State, crashes: &Crashes, now: Duration) -> Option<WorkerId> {
     let rank = |(id, worker): &(&WorkerId, &AttachedWorker)| {
-        let held = if crashes.is_empty() { state.held(worker) } else { 0 };
+        let held = if crashes.is_empty() { state.batches_held(worker) } else { 0 };
         (reputation(state, worker, crashes), held, **id)
     };
     let takers = state.workers.iter().filter(|(_, worker)| !worker.draining);
@@ -108,8 +108,8 @@ pub(crate) fn forget_old_crashes(state: &mut State, now: Duration) {
 /// Returns the failure of a job with a poison realization, if it has one.
 pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<RunFailure> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
-    let over = |index: &u64| Some((*index, evaluation.crashes.get(index)?));
-    let waiting = evaluation.quarantine.iter().filter_map(over);
+    let crashes_over = |index: &u64| Some((*index, evaluation.crashes.get(index)?));
+    let waiting = evaluation.quarantine.iter().filter_map(crashes_over);
     let is_poison = |(_, crashes): &(u64, &Crashes)| is_poison(state, crashes, |_| true, now);
     let (index, crashes) = waiting.into_iter().find(is_poison)?;
     let hosts = crashes.hosts().into_iter().collect::<Vec<_>>().join(", ");
@@ -137,8 +137,8 @@ pub(crate) fn is_poison(
     of: impl Fn(&WorkerName) -> bool,
     now: Duration,
 ) -> bool {
-    let long = |last| now.saturating_sub(last) >= state.config.expiry;
-    crashes.last().is_some_and(long) && crash_limit_reached(state, crashes, of)
+    let is_long_ago = |last| now.saturating_sub(last) >= state.config.expiry;
+    crashes.last().is_some_and(is_long_ago) && crash_limit_reached(state, crashes, of)
 }
 
 /// Returns whether no further worker in `of` shall be risked for a task over which `crashes`
@@ -148,12 +148,12 @@ pub(crate) fn crash_limit_reached(
     crashes: &Crashes,
     of: impl Fn(&WorkerName) -> bool,
 ) -> bool {
-    let untried = |worker: &AttachedWorker| {
+    let is_untried = |worker: &AttachedWorker| {
         let (failing, silent, lost, _) = reputation(state, worker, crashes);
         let stayed = crashes.first().is_some_and(|first| worker.attached < first);
         !worker.draining && !silent && !failing && (stayed || !lost) && of(&worker.name)
     };
-    crashes.reach_limit(|| state.workers.values().any(untried))
+    crashes.reach_limit(|| state.workers.values().any(is_untried))
 }
 
 /// Returns the reputation of a worker for a task over which `crashes` happened.

@@ -22,7 +22,7 @@ pub(crate) fn ask_before(turn: &mut Turn, worker: WorkerId, job: JobId) {
         return;
     }
     if turn.state.proofs.for_setup(&setup).is_none() {
-        if !turn.state.several_hosts() || !begin(turn, job, setup) {
+        if !turn.state.has_several_hosts() || !begin(turn, job, setup) {
             return;
         }
         ask(turn, worker, job);
@@ -32,7 +32,7 @@ pub(crate) fn ask_before(turn: &mut Turn, worker: WorkerId, job: JobId) {
     }
 }
 
-/// Begins the proofs of a setup with realizations of the first point of a job that is known.
+/// Begins the proofs of a setup with realizations of a job's first known point.
 fn begin(turn: &mut Turn, id: JobId, setup: SetupKey) -> bool {
     let attempt = turn.state.new_attempt();
     let known = turn.state.jobs.get(&id).and_then(|job| {
@@ -49,7 +49,7 @@ fn begin(turn: &mut Turn, id: JobId, setup: SetupKey) -> bool {
     true
 }
 
-/// Asks hosts that have not voted, until so many have, or are asked.
+/// Asks hosts that have not voted, until `hosts_max` have voted or are asked.
 pub(super) fn ask_further(turn: &mut Turn, job: JobId, hosts_max: usize) {
     let Some(setup) = turn.state.jobs.get(&job).map(|job| job.setup) else {
         return;

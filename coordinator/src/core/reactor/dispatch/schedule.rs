@@ -1,4 +1,4 @@
-//! Order of workers and jobs.
+//! Which worker, and which job, is served next.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -33,12 +33,12 @@ pub(crate) fn next_job(state: &State) -> Option<JobId> {
 pub(crate) fn next_job_that_may(state: &State, may: impl Fn(JobId, &Job) -> bool) -> Option<JobId> {
     let with_work = state.active.iter().filter_map(|id| {
         let job = state.jobs.get(id).filter(|job| may(*id, job))?;
-        let asked_for = job.evaluation().is_some_and(|it| !it.queue.is_empty());
-        (asked_for || job.ahead.has_queue()).then_some((*id, job))
+        let waits = job.evaluation().is_some_and(|it| !it.queue.is_empty());
+        (waits || job.ahead.has_queue()).then_some((*id, job))
     });
     let rank = |(id, job): (JobId, &Job)| {
         let JobRecord { client, priority, .. } = &job.record;
-        let had = state.shares.used(client);
+        let had = state.shares.computing_time(client);
         let served = state.last_served.is_some_and(|last| id <= last);
         (had, client.clone(), Reverse(*priority), served, id)
     };
@@ -50,7 +50,7 @@ pub(crate) fn checks_wait(state: &State) -> bool {
     let mut jobs = state.active.iter().filter_map(|id| state.jobs.get(id));
     jobs.any(|job| {
         let mut disputes = job.evaluation().into_iter().flat_map(|asked_for| &asked_for.disputes);
-        job.certain().any(|evaluation| !evaluation.audits.is_empty())
+        job.certain_evaluations().any(|evaluation| !evaluation.audits.is_empty())
             || disputes.any(|dispute| votes::are_lacking(state, dispute))
     })
 }

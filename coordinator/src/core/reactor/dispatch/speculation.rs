@@ -40,10 +40,10 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
     let evaluation = match known.map(|at| job.speculation.evaluations.remove(at)) {
         Some(known) => {
             job.rate.add(known.filled(), turn.now);
-            renumbered(known, number, turn.now)
+            renumber(known, number, turn.now)
         }
         None => match ahead::adopt(job, &point) {
-            Some(known) => renumbered(known, number, turn.now),
+            Some(known) => renumber(known, number, turn.now),
             None => job.new_evaluation(number, attempt, point, &turn.state.config),
         },
     };
@@ -56,7 +56,7 @@ pub(crate) fn begin(turn: &mut Turn, id: JobId, point: Point) {
 }
 
 /// Returns an evaluation that was begun before the search asked for it, as its evaluation `number`.
-fn renumbered(mut known: PendingEvaluation, number: u64, now: Duration) -> PendingEvaluation {
+fn renumber(mut known: PendingEvaluation, number: u64, now: Duration) -> PendingEvaluation {
     known.number = number;
     // Disputes could not be decided before.
     known.disputes.iter_mut().for_each(|dispute| dispute.since = now);
@@ -80,11 +80,11 @@ pub(crate) fn drop_all(turn: &mut Turn, id: JobId) {
 
 /// Drops the speculative evaluations of a job that contain answers of a banned host.
 pub(crate) fn forget(turn: &mut Turn, id: JobId, host: &str) {
-    let contributed = |evaluation: &PendingEvaluation| {
+    let has_contribution = |evaluation: &PendingEvaluation| {
         WorkerName::any_of(&evaluation.workers, host)
             || evaluation.disputes.iter().any(|dispute| dispute.has_vote_of(host))
     };
-    retain(turn, id, |evaluation| !contributed(evaluation));
+    retain(turn, id, |evaluation| !has_contribution(evaluation));
 }
 
 /// Drops the newest speculative evaluations, then those of the last branches, until the limit on
@@ -160,12 +160,11 @@ fn retain(turn: &mut Turn, id: JobId, stays: impl Fn(&PendingEvaluation) -> bool
 
 impl Speculation {
     /// Returns the speculative evaluation of a point.
-    pub(crate) fn at(&self, point: &Point) -> Option<&PendingEvaluation> {
+    pub(crate) fn evaluation_at(&self, point: &Point) -> Option<&PendingEvaluation> {
         self.evaluations.iter().find(|begun| same_point(&begun.point, point))
     }
 
-    /// As [`Speculation::at`].
-    pub(crate) fn at_mut(&mut self, point: &Point) -> Option<&mut PendingEvaluation> {
+    pub(crate) fn evaluation_at_mut(&mut self, point: &Point) -> Option<&mut PendingEvaluation> {
         self.evaluations.iter_mut().find(|begun| same_point(&begun.point, point))
     }
 }

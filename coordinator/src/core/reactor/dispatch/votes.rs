@@ -9,13 +9,13 @@ use crate::core::state::{AttachedWorker, State};
 
 /// Returns whether a dispute needs more votes than are on their way.
 pub(crate) fn are_lacking(state: &State, dispute: &Dispute) -> bool {
-    // At least one more: without it there would be no dispute.
+    // An open dispute lacks at least one vote: otherwise it would be decided.
     let lacks = dispute.ballot.lacks(voters(state, dispute, |_| false)).max(1);
     dispute.tie_breakers.len() < lacks
 }
 
 /// Returns the number of hosts that may decide a dispute: those that have voted, and those with workers that
-/// answer batches, at most as many as are asked. Hosts do not count that were asked by a batch that `is_late`.
+/// answer batches; at most [`VOTERS_MAX`]. A worker that was asked by a batch which `is_late` does not count.
 pub(crate) fn voters(state: &State, dispute: &Dispute, is_late: impl Fn(BatchId) -> bool) -> usize {
     let late = dispute.tie_breakers.iter().filter(|id| is_late(**id));
     let late = late.filter_map(|id| state.batches.get(id)).map(|batch| batch.worker);

@@ -23,7 +23,7 @@ use crate::core::worker_name::WorkerName;
 /// Takes in a worker's answer. If the batch was settled before (a duplicate was faster, or the
 /// answer came twice), the answer is only compared with the known results; the answer to an unknown
 /// batch is ignored.
-pub(crate) fn answered(
+pub(crate) fn take_answer(
     turn: &mut Turn,
     worker: WorkerId,
     batch: BatchId,
@@ -38,8 +38,9 @@ pub(crate) fn answered(
     attached.rate.add(solved.len() as u64, turn.now);
     let name = attached.name.clone();
     let held = turn.state.batches.get(&batch).filter(|held| held.worker == worker);
-    let late = || attached.settled.iter().find(|(id, _)| *id == batch).map(|(_, about)| *about);
-    let Some(assignment) = held.map(|held| held.assignment).or_else(late) else {
+    let find_settled =
+        || attached.settled.iter().find(|(id, _)| *id == batch).map(|(_, about)| *about);
+    let Some(assignment) = held.map(|held| held.assignment).or_else(find_settled) else {
         return;
     };
     let (purpose, duplicates) = held.map(|held| (held.purpose, held.duplicates.clone())).unzip();
@@ -60,7 +61,7 @@ pub(crate) fn answered(
         return;
     }
     if purpose.is_some() {
-        overdue::answered(turn.state, worker, batch, turn.now);
+        overdue::note_answer(turn.state, worker, batch, turn.now);
     }
     match purpose {
         Some(Purpose::Fill | Purpose::Exclusive | Purpose::Speculative) => {
@@ -78,11 +79,11 @@ pub(crate) fn answered(
         }
         Some(Purpose::TieBreak) => {
             take_back(turn, duplicates);
-            checks::tie_broken(turn, batch, &assignment, solved, &name);
+            checks::take_tie_break(turn, batch, &assignment, solved, &name);
         }
         Some(Purpose::Proof) => {
             learn_pace(turn.state, &assignment, worker, elapsed_s);
-            checks::proven(turn, (worker, batch), &assignment, solved, &name);
+            checks::take_proof(turn, (worker, batch), &assignment, solved, &name);
             take_early(turn, worker);
         }
         None => checks::compare(turn, &assignment, &solved, &name),
@@ -139,7 +140,7 @@ fn take_early(turn: &mut Turn, worker: WorkerId) {
     let attached = turn.state.workers.get_mut(&worker);
     let early = attached.map(|attached| std::mem::take(&mut attached.early));
     for EarlyAnswer { batch, solved, elapsed_s } in early.unwrap_or_default() {
-        answered(turn, worker, batch, solved, elapsed_s);
+        take_answer(turn, worker, batch, solved, elapsed_s);
     }
 }
 
@@ -170,7 +171,7 @@ fn learn_pace(state: &mut State, assignment: &Assignment, worker: WorkerId, elap
 /// Revokes the duplicates of a batch that was answered.
 fn take_back(turn: &mut Turn, duplicates: Vec<BatchId>) {
     for duplicate in duplicates {
-        overdue::missed(turn.state, duplicate, turn.now);
+        overdue::count_missed(turn.state, duplicate, turn.now);
         batches::revoke(turn, duplicate);
     }
 }
@@ -188,7 +189,8 @@ fn fill(
     let before = evaluation.filled();
     evaluation.fill(assignment.indices, solved, by);
     let news = evaluation.filled() - before;
-    let asked_for = |job: &&mut Job| job.certain().any(|it| it.attempt == assignment.attempt);
+    let asked_for =
+        |job: &&mut Job| job.certain_evaluations().any(|it| it.attempt == assignment.attempt);
     if let Some(job) = state.jobs.get_mut(&assignment.job).filter(asked_for) {
         job.rate.add(news, now);
         job.progressed = now;
@@ -202,7 +204,7 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, (before, now): (Dur
     let plausible = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
     let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);
     let rate = batch.assignment.indices.count as f64 / if plausible { elapsed_s } else { waited_s };
-    // Others waited behind the batch before them.
+    // A batch that was sent before that answer waited behind the answered one.
     if plausible && batch.sent >= before {
         state.delay.learn(waited_s, elapsed_s);
     }

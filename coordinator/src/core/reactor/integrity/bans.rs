@@ -134,16 +134,16 @@ fn compute_again(turn: &mut Turn, id: JobId) {
 }
 
 /// Handles the report that the ban with this number is durable.
-pub(crate) fn stored(turn: &mut Turn, number: u64) {
+pub(crate) fn on_ban_stored(turn: &mut Turn, number: u64) {
     let found = turn.state.banned.iter_mut().find(|banned| banned.record.number == number);
     if let Some(banned) = found {
         banned.store_at = None;
-        replay::read_on(turn);
+        replay::continue_replays(turn);
     }
 }
 
 /// Handles the report that the ban with this number could not be stored; the write is repeated later.
-pub(crate) fn store_failed(turn: &mut Turn, number: u64, error: String) {
+pub(crate) fn on_ban_not_stored(turn: &mut Turn, number: u64, error: String) {
     let found = turn.state.banned.iter_mut().find(|banned| banned.record.number == number);
     if let Some(banned) = found {
         banned.refused = true;

@@ -11,7 +11,7 @@ use crate::core::ballot::{Ballot, BallotResult, Cast, Contradiction, Vote};
 use crate::core::batch::Assignment;
 use crate::core::dispute::Dispute;
 use crate::core::evaluation::{Audit, PendingEvaluation};
-use crate::core::failure::{RunFailure, shown};
+use crate::core::failure::{RunFailure, describe_answer};
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::Job;
 use crate::core::proofs::SetupKey;
@@ -96,8 +96,8 @@ pub(crate) fn contradicts_itself(
     contradiction: Contradiction,
 ) {
     let [(_, earlier), (_, later)] = contradiction.answers;
-    if turn.state.several_hosts() {
-        let what = format!("{} and as {}", shown(earlier), shown(later));
+    if turn.state.has_several_hosts() {
+        let what = format!("{} and as {}", describe_answer(earlier), describe_answer(later));
         let reason = format!("answered realization {} as {what}", contradiction.index);
         bans::ban(turn, by, assignment.job, reason);
     } else if let Some(point) = turn.state.point_of(assignment) {
@@ -107,7 +107,7 @@ pub(crate) fn contradicts_itself(
 }
 
 /// Takes in the proof of a worker.
-pub(crate) fn proven(
+pub(crate) fn take_proof(
     turn: &mut Turn,
     (worker, batch): (WorkerId, BatchId),
     assignment: &Assignment,
@@ -139,10 +139,9 @@ pub(crate) fn proven(
 /// that waited for it.
 pub(crate) fn decide_proofs(turn: &mut Turn, setup: &SetupKey) {
     ban_outvoted_by_proofs(turn, setup);
-    let of_setup = |id: &&JobId| turn.state.jobs.get(id).is_some_and(|job| job.setup == *setup);
-    let jobs: Vec<JobId> = turn.state.active.iter().filter(of_setup).copied().collect();
+    let jobs: Vec<JobId> = turn.state.active_jobs_of(setup).collect();
     for id in jobs {
-        let attempts = turn.state.jobs.get(&id).into_iter().flat_map(Job::certain);
+        let attempts = turn.state.jobs.get(&id).into_iter().flat_map(Job::certain_evaluations);
         let attempts: Vec<u64> = attempts.map(|evaluation| evaluation.attempt).collect();
         for attempt in attempts {
             jobs::settle(turn, id, attempt);
@@ -156,26 +155,27 @@ fn ban_outvoted_by_proofs(turn: &mut Turn, setup: &SetupKey) {
         return;
     };
     if proofs.ballot.is_unanimous() {
-        // The voters of a thousand hosts need not be counted after each proof.
+        // Saves counting the voters among a thousand hosts after each proof.
         return;
     }
     let verdict = proofs.ballot.verdict(clearance::proof_voters(turn.state, setup, turn.now));
-    if let Some((verdict, job)) = verdict.zip(turn.state.active_job_of(setup)) {
+    let job = turn.state.active_jobs_of(setup).next();
+    if let Some((verdict, job)) = verdict.zip(job) {
         ban_outvoted(turn, job, verdict);
     }
 }
 
 /// Takes in the answer of a tie-breaker.
-pub(crate) fn tie_broken(
+pub(crate) fn take_tie_break(
     turn: &mut Turn,
     batch: BatchId,
     assignment: &Assignment,
     solved: Vec<RealizationResult>,
     by: &WorkerName,
 ) {
-    let of_batch = |dispute: &Dispute| dispute.tie_breakers.contains(&batch);
-    let found = |it: &mut PendingEvaluation| it.disputes.iter().position(of_batch);
-    let at = turn.state.evaluation_of_mut(assignment).and_then(found);
+    let has_tie_breaker = |dispute: &Dispute| dispute.tie_breakers.contains(&batch);
+    let find_dispute = |it: &mut PendingEvaluation| it.disputes.iter().position(has_tie_breaker);
+    let at = turn.state.evaluation_of_mut(assignment).and_then(find_dispute);
     turn.state.settle(batch);
     let Some((at, evaluation)) = at.zip(turn.state.evaluation_of_mut(assignment)) else {
         return;
@@ -188,8 +188,8 @@ pub(crate) fn tie_broken(
 
 /// Ends a dispute of an evaluation if one answer has the majority.
 fn decide_dispute(turn: &mut Turn, job: JobId, attempt: u64, at: usize) {
-    let of_attempt = |it: &&PendingEvaluation| it.attempt == attempt;
-    let found = turn.state.jobs.get(&job).and_then(|job| job.evaluations().find(of_attempt));
+    let has_attempt = |it: &&PendingEvaluation| it.attempt == attempt;
+    let found = turn.state.jobs.get(&job).and_then(|job| job.evaluations().find(has_attempt));
     let Some(dispute) = found.and_then(|evaluation| evaluation.disputes.get(at)) else {
         return;
     };
@@ -224,9 +224,9 @@ fn ban_outvoted(turn: &mut Turn, job: JobId, verdict: BallotResult) {
     for Contradiction { index, answers: [(_, right), (worker, wrong)], .. } in outvoted {
         let reason = format!(
             "answered realization {index} of job {job} with {}, while {}{further} agree on {}",
-            shown(wrong),
+            describe_answer(wrong),
             first.join(", "),
-            shown(right)
+            describe_answer(right)
         );
         bans::ban(turn, &worker, job, reason);
     }
@@ -257,7 +257,7 @@ pub(crate) fn give_up(turn: &mut Turn) {
         for attempt in give_up_audits(turn.state, job) {
             jobs::settle(turn, job, attempt);
         }
-        if let Some((failure, ballot)) = undecided(turn.state, job, turn.now) {
+        if let Some((failure, ballot)) = find_undecided(turn.state, job, turn.now) {
             if let Some((RunFailure::Contradiction { contradiction, point }, ballot)) =
                 Some(&failure).zip(ballot)
             {
@@ -274,13 +274,13 @@ fn give_up_audits(state: &mut State, id: JobId) -> Vec<u64> {
     let Some(job) = state.jobs.get_mut(&id) else {
         return Vec::new();
     };
-    let attempts: Vec<u64> = job.certain().map(|it| it.attempt).collect();
-    let with = job.certain_mut().filter(|it| !it.audits.is_empty());
+    let attempts: Vec<u64> = job.certain_evaluations().map(|it| it.attempt).collect();
+    let with = job.certain_evaluations_mut().filter(|it| !it.audits.is_empty());
     let pending: Vec<_> = with.map(|it| (it.attempt, std::mem::take(&mut it.audits))).collect();
     for (attempt, mut audits) in pending {
         audits.retain(|audit| state.can_check(audit.by.host()));
         let job = state.jobs.get_mut(&id);
-        if let Some(evaluation) = job.and_then(|job| job.certain_with_mut(attempt)) {
+        if let Some(evaluation) = job.and_then(|job| job.certain_evaluation_mut(attempt)) {
             evaluation.audits = audits;
         }
     }
@@ -289,7 +289,11 @@ fn give_up_audits(state: &mut State, id: JobId) -> Vec<u64> {
 
 /// Returns the failure of a job with a dispute that cannot be decided, or with workers whose proofs
 /// contradict each other, if there is one, with the votes of the dispute.
-fn undecided(state: &State, job: JobId, now: Duration) -> Option<(RunFailure, Option<Ballot>)> {
+fn find_undecided(
+    state: &State,
+    job: JobId,
+    now: Duration,
+) -> Option<(RunFailure, Option<Ballot>)> {
     let evaluation = state.jobs.get(&job)?.evaluation()?;
     let setup = state.jobs.get(&job)?.setup;
     if let Some(proofs) = state.proofs.for_setup(&setup)
@@ -306,8 +310,8 @@ fn undecided(state: &State, job: JobId, now: Duration) -> Option<(RunFailure, Op
         let others = |name: &WorkerName| !dispute.has_vote_of(name.host());
         let nobody = !state.answers_batches(others);
         let lethal = poison::is_poison(state, &dispute.crashes, others, now);
-        let waited_for = |tie_breaker| overdue::is_waited_for(state, tie_breaker, now);
-        !dispute.tie_breakers.iter().copied().any(waited_for) && (lethal || (nobody && !patient))
+        let is_waited_for = |tie_breaker| overdue::is_waited_for(state, tie_breaker, now);
+        !dispute.tie_breakers.iter().copied().any(is_waited_for) && (lethal || (nobody && !patient))
     };
     let dispute = evaluation.disputes.iter().find(hopeless)?;
     let contradiction = Box::new(dispute.ballot.contradiction()?);

@@ -81,7 +81,7 @@ fn complete_aside(turn: &mut Turn, id: JobId) {
 }
 
 /// Stores an evaluation while its search takes it in, beside the core.
-pub(crate) fn gathered(turn: &mut Turn, gathered: Gathered) {
+pub(crate) fn store_gathered(turn: &mut Turn, gathered: Gathered) {
     let Gathered { job: id, attempt, record, is_last } = gathered;
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
@@ -128,11 +128,11 @@ pub(crate) fn cancel(turn: &mut Turn, id: JobId) {
             begin(turn, id);
         }
         Stage::Waiting | Stage::Computing(_) | Stage::Completing(_) => {
-            finish(turn, id, cancelled());
+            finish(turn, id, cancelled_ending());
         }
         // The store cannot read the evaluations that would still belong to its output.
         Stage::Replaying { .. } if job.store_retry.is_some() => {
-            finish(turn, id, cancelled());
+            finish(turn, id, cancelled_ending());
         }
         Stage::StoringSubmission
         | Stage::Replaying { .. }
@@ -206,7 +206,7 @@ pub(crate) fn advance(turn: &mut Turn, id: JobId) {
     }
     let part = job.search.part();
     let ending = match job.search.ask() {
-        Step::Evaluate(_) if job.cancelled => cancelled(),
+        Step::Evaluate(_) if job.cancelled => cancelled_ending(),
         Step::Evaluate(_) if store_prepared(turn, id) => {
             ahead::drop_before(turn, id, part);
             return;
@@ -233,7 +233,7 @@ fn store_prepared(turn: &mut Turn, id: JobId) -> bool {
     let Step::Evaluate(first) = job.search.ask() else {
         return false;
     };
-    if job.ahead.prepared(&first).is_none() {
+    if job.ahead.prepared_evaluation(&first).is_none() {
         return false;
     }
     let mut after = Box::new(job.search.clone());
@@ -321,13 +321,13 @@ fn leave(turn: &mut Turn, id: JobId) {
 }
 
 /// Returns the end of a cancelled job.
-pub(crate) fn cancelled() -> Ending {
+pub(crate) fn cancelled_ending() -> Ending {
     Ending { status: Status::Cancelled, failure: None, reason: None }
 }
 
 /// Requests the next stored evaluation of a job, unless a ban is not durable yet.
 pub(crate) fn read_next(turn: &mut Turn, id: JobId) {
-    let may = !turn.state.ban_pending();
+    let may = !turn.state.has_pending_ban();
     if let Some(job) = turn.state.jobs.get_mut(&id) {
         job.stage = Stage::Replaying { asked: may };
         if may {

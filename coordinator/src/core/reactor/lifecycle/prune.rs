@@ -16,8 +16,8 @@ const LOOK_EVERY: Duration = Duration::from_secs(60);
 const GRACE: Duration = Duration::from_secs(3600);
 
 /// Deletes the jobs that `retention` does not keep; the client is answered when that is durable.
-pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, retention: Retention) {
-    let jobs = chosen(turn.state, retention, turn.now);
+pub(crate) fn prune_on_request(turn: &mut Turn, reply_id: ReplyId, retention: Retention) {
+    let jobs = choose_jobs(turn.state, retention, turn.now);
     if jobs.is_empty() {
         turn.effects.push(Effect::Answer { reply_id, answer: Answer::Pruned(jobs) });
     } else {
@@ -36,7 +36,7 @@ pub(crate) fn tick(turn: &mut Turn) {
     }
     turn.state.pruned = Some(turn.now);
     let retention = Retention { keep_for: Some(keep_for), keep_last: None };
-    let jobs = chosen(turn.state, retention, turn.now);
+    let jobs = choose_jobs(turn.state, retention, turn.now);
     let grace = GRACE.min(keep_for).saturating_sub(turn.now.saturating_sub(turn.state.started));
     // Until then, no job that ended in this run can be older than that.
     if grace > Duration::ZERO {
@@ -56,7 +56,7 @@ pub(crate) fn tick(turn: &mut Turn) {
 }
 
 /// Removes jobs that the store has deleted, or reports that it could not delete them.
-pub(crate) fn pruned(
+pub(crate) fn on_pruned(
     turn: &mut Turn,
     reply_id: Option<ReplyId>,
     jobs: Vec<JobId>,
@@ -81,15 +81,15 @@ pub(crate) fn pruned(
 }
 
 /// Returns the ended jobs that are not kept, in the order of their identifiers.
-fn chosen(state: &State, retention: Retention, now: Duration) -> Vec<JobId> {
+fn choose_jobs(state: &State, retention: Retention, now: Duration) -> Vec<JobId> {
     let Retention { keep_for, keep_last } = retention;
     let mut ended: Vec<(Duration, JobId)> =
         state.ended.iter().map(|(id, job)| (job.end.ended, *id)).collect();
     ended.sort_unstable();
     let keep_last = usize::try_from(keep_last.unwrap_or(0)).unwrap_or(usize::MAX);
     ended.truncate(ended.len().saturating_sub(keep_last));
-    let young = |at: Duration| keep_for.is_some_and(|age| now.saturating_sub(at) <= age);
-    ended.retain(|(at, _)| !young(*at));
+    let is_young = |at: Duration| keep_for.is_some_and(|age| now.saturating_sub(at) <= age);
+    ended.retain(|(at, _)| !is_young(*at));
     let mut jobs: Vec<JobId> = ended.into_iter().map(|(_, id)| id).collect();
     jobs.sort_unstable();
     jobs

@@ -23,7 +23,7 @@ pub(crate) fn note_doubts(turn: &mut Turn, ban: u64, jobs: Vec<JobId>) {
 }
 
 /// Begins a job again that has ended; the client is answered when that is durable.
-pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, id: JobId) -> Option<Answer> {
+pub(crate) fn recheck_on_request(turn: &mut Turn, reply_id: ReplyId, id: JobId) -> Option<Answer> {
     if let Some(job) = turn.state.jobs.get(&id) {
         // It is computed again already.
         return Some(match job.doubts.is_empty() {
@@ -44,7 +44,7 @@ pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, id: JobId) -> Option
 }
 
 /// Takes in a job that is unfinished again in the store.
-pub(crate) fn reopened(
+pub(crate) fn on_reopened(
     turn: &mut Turn,
     reply_id: ReplyId,
     id: JobId,

@@ -80,7 +80,7 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
 
 /// Takes over the search that was told of an evaluation beside the core; the job continues if the
 /// evaluation is durable.
-pub(crate) fn completed(turn: &mut Turn, completed: Completed) {
+pub(crate) fn on_completed(turn: &mut Turn, completed: Completed) {
     let Completed { job: id, attempt, after: told } = completed;
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
@@ -123,10 +123,10 @@ fn go_on(turn: &mut Turn, id: JobId) {
 /// Handles the report that a record could not be stored. A submission is refused. Any other record is
 /// written again until it succeeds, because a change takes effect, and a job ends, only once its
 /// record is durable.
-pub(crate) fn store_failed(turn: &mut Turn, id: JobId, key: RecordKey, error: String) {
+pub(crate) fn on_record_not_stored(turn: &mut Turn, id: JobId, key: RecordKey, error: String) {
     if key == RecordKey::Part {
         if let Some(job) = turn.state.jobs.get_mut(&id) {
-            job.certain_mut().for_each(PendingEvaluation::save_again);
+            job.certain_evaluations_mut().for_each(PendingEvaluation::save_again);
         }
         return;
     }

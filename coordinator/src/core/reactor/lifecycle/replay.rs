@@ -15,8 +15,8 @@ use crate::store::EvaluationRecord;
 use osteon_search::Step;
 
 /// Continues replays that waited for a ban to be durable.
-pub(crate) fn read_on(turn: &mut Turn) {
-    if turn.state.ban_pending() {
+pub(crate) fn continue_replays(turn: &mut Turn) {
+    if turn.state.has_pending_ban() {
         return;
     }
     for (&id, job) in &mut turn.state.jobs {
@@ -28,7 +28,7 @@ pub(crate) fn read_on(turn: &mut Turn) {
 }
 
 /// Takes in the stored record of an evaluation.
-pub(crate) fn read(
+pub(crate) fn on_read(
     turn: &mut Turn,
     id: JobId,
     number: u64,
@@ -48,7 +48,7 @@ pub(crate) fn read(
             replay(turn, id, record);
         }
         Ok(None) => jobs::fail(turn, id, &RunFailure::Missing { number }),
-        Err(ReadFailure::Refused { error }) => read_failed(turn, id, error),
+        Err(ReadFailure::Refused { error }) => retry_read_later(turn, id, error),
         Err(ReadFailure::Damaged) => recompute(turn, id),
     }
 }
@@ -64,7 +64,7 @@ fn recompute(turn: &mut Turn, id: JobId) {
     job.progressed = turn.now;
     turn.state.changed.insert(id);
     if job.cancelled {
-        jobs::finish(turn, id, jobs::cancelled());
+        jobs::finish(turn, id, jobs::cancelled_ending());
         return;
     }
     match job.search.ask() {
@@ -82,14 +82,14 @@ fn recompute(turn: &mut Turn, id: JobId) {
 
 /// Schedules another read after the store could not be read. Reads are repeated for as long as
 /// necessary, unless the job is cancelled.
-fn read_failed(turn: &mut Turn, id: JobId, error: String) {
+fn retry_read_later(turn: &mut Turn, id: JobId, error: String) {
     let retry_at = turn.now + turn.state.config.store_retry;
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
     if job.cancelled {
         // No more than the evaluations replayed so far can be known.
-        jobs::finish(turn, id, jobs::cancelled());
+        jobs::finish(turn, id, jobs::cancelled_ending());
         return;
     }
     let since = job.store_retry.as_ref().map_or(turn.now, |store_retry| store_retry.since);
@@ -126,7 +126,7 @@ fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
         }
     } else if doubtful {
         // Only the evaluations replayed so far are known to be right.
-        jobs::finish(turn, id, jobs::cancelled());
+        jobs::finish(turn, id, jobs::cancelled_ending());
     } else {
         match job.search.replay(point, outcomes, estimated_error) {
             Ok(()) => {

@@ -25,7 +25,7 @@ use crate::store::JobRecord;
 /// Maximum number of banned workers that are listed.
 const BANNED_SHOWN_MAX: usize = 1000;
 
-pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, request: Request) {
+pub(crate) fn handle_request(turn: &mut Turn, reply_id: ReplyId, request: Request) {
     let answer = match request {
         Request::Submit { specification, request_id, client, priority, name } => {
             let submission = SubmittedJob { specification, request_id, client, priority, name };
@@ -51,13 +51,13 @@ pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, request: Request) {
         }
         Request::Cancel(job) => cancel(turn, reply_id, job),
         Request::Fetch(job) => Some(job_pages::end(turn.state, job)),
-        Request::Banned => Some(banned(turn.state, turn.now)),
+        Request::Banned => Some(list_banned(turn.state, turn.now)),
         Request::Workers => Some(Answer::Workers(worker_list::all(turn.state, turn.now))),
         Request::DrainWorker(worker) => Some(drain(turn, worker)),
         Request::Unban(host) => Some(unban(turn, &host)),
-        Request::Recheck(job) => recheck::requested(turn, reply_id, job),
+        Request::Recheck(job) => recheck::recheck_on_request(turn, reply_id, job),
         Request::Prune(retention) => {
-            prune::requested(turn, reply_id, retention);
+            prune::prune_on_request(turn, reply_id, retention);
             None
         }
     };
@@ -66,7 +66,6 @@ pub(crate) fn requested(turn: &mut Turn, reply_id: ReplyId, request: Request) {
     }
 }
 
-/// A submitted job.
 struct SubmittedJob {
     specification: Arc<JobSpecification>,
     request_id: String,
@@ -114,7 +113,7 @@ fn submit(
 
 /// Checks that one more job of a client fits beside those that have not ended.
 fn find_place(state: &State, client: &str) -> Result<(), Refusal> {
-    if state.unfinished() >= JOBS_MAX {
+    if state.unfinished_jobs() >= JOBS_MAX {
         return Err(Refusal::TooManyJobs { limit: JOBS_MAX });
     }
     let limit = JOBS_MAX / CLIENT_SHARE_DIVISOR as usize;
@@ -127,14 +126,18 @@ fn find_place(state: &State, client: &str) -> Result<(), Refusal> {
 
 /// Checks that a specification of `more` bytes fits beside those of the jobs that have not ended.
 fn find_room(state: &State, client: &str, more: u64) -> Result<(), Refusal> {
-    let of = |whose: &dyn Fn(&str) -> bool| -> u64 {
+    let held_bytes = |whose: &dyn Fn(&str) -> bool| -> u64 {
         let jobs = state.jobs.values().filter(|job| whose(&job.record.client));
         jobs.map(|job| job.bytes).sum()
     };
     let limit = state.config.jobs_bytes_max;
     for (whose, held, limit) in [
-        ("this client's", of(&|name| name == client), limit / u64::from(CLIENT_SHARE_DIVISOR)),
-        ("all", of(&|_| true), limit),
+        (
+            "this client's",
+            held_bytes(&|name| name == client),
+            limit / u64::from(CLIENT_SHARE_DIVISOR),
+        ),
+        ("all", held_bytes(&|_| true), limit),
     ] {
         if held + more > limit {
             return Err(Refusal::TooMuchQueued { whose, held, more, limit });
@@ -189,7 +192,7 @@ fn cancel(turn: &mut Turn, reply_id: ReplyId, id: JobId) -> Option<Answer> {
 
 /// Drains a worker, and returns its snapshot.
 fn drain(turn: &mut Turn, worker: WorkerId) -> Answer {
-    match workers::send_away(turn, worker) {
+    match workers::drain_worker(turn, worker) {
         Ok(()) => worker_list::worker_snapshot(turn.state, worker, turn.now)
             .map_or(Answer::Refused(Refusal::NoWorker { worker }), Answer::Worker),
         Err(refusal) => Answer::Refused(refusal),
@@ -212,7 +215,7 @@ fn unban(turn: &mut Turn, host: &str) -> Answer {
     Answer::Unbanned(record)
 }
 
-fn banned(state: &State, now: Duration) -> Answer {
+fn list_banned(state: &State, now: Duration) -> Answer {
     let in_force = || state.banned.iter().filter(|banned| banned.record.lifted.is_none());
     let newest = in_force().count().saturating_sub(BANNED_SHOWN_MAX);
     let shown = in_force()

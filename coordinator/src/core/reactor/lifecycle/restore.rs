@@ -95,17 +95,17 @@ fn keep_numerics(
 
 impl Restored {
     /// Returns the number of jobs that have not ended.
-    pub fn unfinished(&self) -> usize {
+    pub fn unfinished_jobs(&self) -> usize {
         self.unfinished.len()
     }
 
     /// Returns the number of jobs that have ended.
-    pub fn ended(&self) -> usize {
+    pub fn ended_jobs(&self) -> usize {
         self.ended.len()
     }
 
     /// Returns the number of banned workers.
-    pub fn banned(&self) -> usize {
+    pub fn banned_workers(&self) -> usize {
         self.banned.len()
     }
 }

@@ -27,25 +27,25 @@ pub(crate) fn compensate_gap(state: &mut State, now: Duration) {
         return;
     }
     tracing::warn!(?gap, "the coordinator was paused; all leases are extended by the gap");
-    let excused = |since: &mut Duration| *since = (*since + gap).min(now);
+    let excuse = |since: &mut Duration| *since = (*since + gap).min(now);
     for worker in state.workers.values_mut() {
-        excused(&mut worker.last_seen);
-        excused(&mut worker.answered);
-        excused(&mut worker.missed.since);
+        excuse(&mut worker.last_seen);
+        excuse(&mut worker.answered);
+        excuse(&mut worker.missed.since);
     }
     for batch in state.batches.values_mut() {
-        excused(&mut batch.sent);
-        excused(&mut batch.begun);
+        excuse(&mut batch.sent);
+        excuse(&mut batch.begun);
     }
     for job in state.jobs.values_mut() {
         if let Some(retry) = &mut job.store_retry {
-            excused(&mut retry.since);
+            excuse(&mut retry.since);
         }
         for evaluation in job.evaluations_mut() {
-            evaluation.crashes.values_mut().for_each(|crashes| crashes.shift(excused));
+            evaluation.crashes.values_mut().for_each(|crashes| crashes.shift(excuse));
             for dispute in &mut evaluation.disputes {
-                excused(&mut dispute.since);
-                dispute.crashes.shift(excused);
+                excuse(&mut dispute.since);
+                dispute.crashes.shift(excuse);
             }
         }
     }
@@ -57,7 +57,7 @@ pub(crate) fn expire(turn: &mut Turn) {
         .state
         .workers
         .iter()
-        .filter_map(|(id, worker)| Some((*id, expired(turn.state, worker, turn.now)?)))
+        .filter_map(|(id, worker)| Some((*id, lease_end_reason(turn.state, worker, turn.now)?)))
         .collect();
     for (worker, reason) in expired {
         workers::close(turn, worker, reason);
@@ -65,7 +65,7 @@ pub(crate) fn expire(turn: &mut Turn) {
 }
 
 /// Returns the reason why the lease of a worker has ended, if it has.
-fn expired(state: &State, worker: &AttachedWorker, now: Duration) -> Option<CloseReason> {
+fn lease_end_reason(state: &State, worker: &AttachedWorker, now: Duration) -> Option<CloseReason> {
     let silent = now.saturating_sub(worker.last_seen);
     if silent > state.config.expiry {
         return Some(CloseReason::Expired { silent });
@@ -121,7 +121,8 @@ pub(crate) fn save_parts(turn: &mut Turn, before_stop: bool) {
         let Some(job) = turn.state.jobs.get_mut(id) else {
             continue;
         };
-        for evaluation in job.certain_mut().filter(|it| !unproven.contains(&it.attempt)) {
+        for evaluation in job.certain_evaluations_mut().filter(|it| !unproven.contains(&it.attempt))
+        {
             let save_at = *evaluation.save_at.get_or_insert(now + SAVE_AFTER);
             if (before_stop || now >= save_at)
                 && let Some(part) = saved::take_unsaved(evaluation, *id, most)

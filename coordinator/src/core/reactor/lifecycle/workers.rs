@@ -19,7 +19,7 @@ use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, MissedBatches, State};
 use crate::core::worker_name::WorkerName;
 
-pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
+pub(crate) fn on_hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
     if turn.state.workers.contains_key(&worker) {
         close(turn, worker, CloseReason::SecondHello);
         return;
@@ -40,7 +40,7 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
     poison::forget_crashes(turn.state, &name);
     if turn.state.probation.attach(&name, turn.now) {
         // An earlier stay of the same worker may not have ended yet.
-        overdue::probation_changed(turn.state);
+        overdue::follow_probation(turn.state);
     }
     turn.effects.push(Effect::Welcome { worker, lease });
     turn.effects.push(Effect::Note(Notice::WorkerAttached {
@@ -73,17 +73,17 @@ pub(crate) fn hello(turn: &mut Turn, worker: WorkerId, hello: Hello) {
             draining: false,
         },
     );
-    turn.state.came_or_went(worker);
+    turn.state.follow_fleet_change(worker);
 }
 
-pub(crate) fn seen(state: &mut State, worker: WorkerId, now: Duration) {
+pub(crate) fn note_sign_of_life(state: &mut State, worker: WorkerId, now: Duration) {
     if let Some(worker) = state.workers.get_mut(&worker) {
         worker.last_seen = now;
     }
 }
 
-pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
-    seen(turn.state, worker, turn.now);
+pub(crate) fn on_draining(turn: &mut Turn, worker: WorkerId) {
+    note_sign_of_life(turn.state, worker, turn.now);
     begin_draining(turn.state, worker);
     batches::preempt(turn, worker);
     departures::dismiss_if_drained(turn, worker);
@@ -94,7 +94,7 @@ pub(crate) fn drains(turn: &mut Turn, worker: WorkerId) {
 ///
 /// # Errors
 /// When no such worker is attached.
-pub(crate) fn send_away(turn: &mut Turn, worker: WorkerId) -> Result<(), Refusal> {
+pub(crate) fn drain_worker(turn: &mut Turn, worker: WorkerId) -> Result<(), Refusal> {
     let attached = turn.state.workers.get(&worker).ok_or(Refusal::NoWorker { worker })?;
     if !attached.draining {
         begin_draining(turn.state, worker);
@@ -121,16 +121,16 @@ pub(crate) fn close(turn: &mut Turn, worker: WorkerId, reason: CloseReason) {
         overdue::begin_probation(turn.state, &name, turn.now, turn.now);
     }
     turn.effects.push(Effect::Close { worker, reason: reason.clone() });
-    lost(turn, worker, Departure::Closed(reason));
+    remove_lost(turn, worker, Departure::Closed(reason));
 }
 
 /// Handles the end of a worker's stream; the batches that it held are reassigned.
-pub(crate) fn stream_ended(turn: &mut Turn, worker: WorkerId) {
-    lost(turn, worker, Departure::StreamEnded);
+pub(crate) fn on_stream_ended(turn: &mut Turn, worker: WorkerId) {
+    remove_lost(turn, worker, Departure::StreamEnded);
 }
 
 /// Removes a worker; the batches that it held are reassigned. Its later events are ignored.
-fn lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
+fn remove_lost(turn: &mut Turn, worker: WorkerId, why: Departure) {
     let draining = turn.state.workers.get(&worker).is_some_and(|worker| worker.draining);
     let why = match why {
         // Its last batches were on their way when it began to drain, or took too long for it.

@@ -8,7 +8,7 @@ use crate::core::batch::Purpose;
 use crate::store::EvaluationRecord;
 
 /// A search for groups whose moments differ.
-fn grouped(groups: u32, realizations: u64) -> JobSpecification {
+fn grouped_search(groups: u32, realizations: u64) -> JobSpecification {
     let group = |k: u32| {
         let mean = 3800.0 + 50.0 * f64::from(k);
         Group::new(format!("group {k}"), vec![0.97 * mean, 1.03 * mean])
@@ -20,7 +20,7 @@ fn grouped(groups: u32, realizations: u64) -> JobSpecification {
 }
 
 /// A search from several starts.
-fn started(starts: u64, realizations: u64) -> JobSpecification {
+fn search_from_starts(starts: u64, realizations: u64) -> JobSpecification {
     let mut job = identification(realizations);
     job.parameters[1] = Range::Free { start: 15e9, lower: 12e9, upper: 25e9 };
     job.search = Search { starts, max_evaluations: 12, ..Search::default() };
@@ -105,7 +105,9 @@ fn run(job: JobSpecification, ahead: bool, workers: u32) -> (Left, u64, usize) {
 
 #[test]
 fn what_is_left_does_not_depend_on_what_is_computed_at_the_same_time() {
-    for job in [grouped(5, 8), started(4, 8), grouped(1, 8), propagation(8)] {
+    for job in
+        [grouped_search(5, 8), search_from_starts(4, 8), grouped_search(1, 8), propagation(8)]
+    {
         let several = job.search.starts > 1 || job.data.as_ref().is_some_and(|it| it.sets() > 1);
         let (plain, _, together) = run(job.clone(), false, 3);
         assert_eq!(together, 0);
@@ -121,7 +123,7 @@ fn what_is_left_does_not_depend_on_what_is_computed_at_the_same_time() {
 fn other_groups_follow_the_first_and_share_its_start() {
     let mut rig = Rig::new();
     rig.state.config.audit_fraction = 0.0;
-    rig.accept(grouped(3, 2));
+    rig.accept(grouped_search(3, 2));
     // All groups begin at one point, so the second worker waits for the first.
     rig.check(
         hello(1, 1),
@@ -145,7 +147,7 @@ fn other_groups_follow_the_first_and_share_its_start() {
 fn what_the_search_asks_for_comes_first() {
     let mut rig = Rig::new();
     rig.state.config.audit_fraction = 0.0;
-    rig.accept(started(3, 4));
+    rig.accept(search_from_starts(3, 4));
     rig.event(hello(1, 1));
     rig.event(hello(2, 1));
     let of_search = rig.state.jobs[&JobId(1)].evaluation().unwrap();
@@ -159,7 +161,7 @@ fn what_the_search_asks_for_comes_first() {
 #[test]
 fn a_cancelled_job_leaves_nothing_of_its_other_parts() {
     let mut rig = Rig::new();
-    rig.accept(started(3, 1));
+    rig.accept(search_from_starts(3, 1));
     rig.event(hello(1, 1));
     assert_eq!(rig.state.batches.len(), 2);
     let expected = ["store job 1 end: cancelled ", "revoke 1: batch 1", "revoke 1: batch 2"];
@@ -171,11 +173,11 @@ fn a_cancelled_job_leaves_nothing_of_its_other_parts() {
 fn other_parts_take_no_memory_from_other_jobs() {
     let mut rig = Rig::new();
     rig.state.config.active_realizations_max = 5;
-    rig.accept(started(4, 2));
+    rig.accept(search_from_starts(4, 2));
     rig.event(hello(1, 8));
     assert_eq!(rig.state.jobs[&JobId(1)].ahead.count(), 1);
     rig.event(submit(1, "", propagation(2)));
-    rig.event(stored(2, RecordKey::Job));
+    rig.event(stored_event(2, RecordKey::Job));
     assert_eq!(rig.state.jobs[&JobId(1)].ahead.count(), 0);
     assert_eq!(rig.state.active.len(), 2);
 }

@@ -18,7 +18,7 @@ fn rig(realizations: u64, workers: u32) -> Rig {
 }
 
 /// Returns an answer of one realization that differs by `off` from the right one.
-pub(super) fn wrong(worker: u64, batch: u64, index: u64, off: RealizationResult) -> Event {
+pub(super) fn wrong_answer(worker: u64, batch: u64, index: u64, off: RealizationResult) -> Event {
     let Ok(right) = velocity(index) else { panic!("a velocity") };
     let Ok(off_by) = off.outcome else { panic!("a velocity") };
     let velocity = f64::from_bits(right.to_bits() + off_by as u64);
@@ -85,7 +85,7 @@ fn workers_of_one_host_do_not_check_each_other() {
     let mut rig = self::rig(1, 1);
     rig.event(of_host(2, 2));
     rig.event(hello_on("node-9", 9, 9, 1));
-    rig.check(wrong(1, 1, 0, ONE_BIT), &["send 9: batch 2 = 0+1"]);
+    rig.check(wrong_answer(1, 1, 0, ONE_BIT), &["send 9: batch 2 = 0+1"]);
     rig.check(answer(9, 2, 0, 1), &[]);
     rig.check(hello_on("node-9", 10, 10, 1), &["welcome 10, lease 4"]);
     let effects = rig.event(hello_on("node-5", 5, 5, 1));
@@ -104,17 +104,17 @@ fn workers_of_one_host_do_not_check_each_other() {
 #[test]
 fn a_ban_lasts_until_it_is_lifted() {
     let mut rig = rig(1, 3);
-    rig.event(wrong(1, 1, 0, ONE_BIT));
+    rig.event(wrong_answer(1, 1, 0, ONE_BIT));
     rig.event(answer(2, 2, 0, 1));
     rig.event(answer(3, 3, 0, 1));
-    rig.event(stored(1, RecordKey::Ban(1)));
+    rig.event(stored_event(1, RecordKey::Ban(1)));
     let unban = |host: &str| request(8, Request::Unban(host.to_owned()));
     let unknown = "answer 8: host `node-2` is not banned; `osteon workers` lists those that are";
     rig.check(unban("node-2"), &[unknown]);
     let effects = rig.event(unban("node-1"));
     assert_eq!(effects.last().map(String::as_str), Some("answer 8: lifted node-1"));
     assert!(effects[0].starts_with("store ban 1: node-1"), "{effects:?}");
-    rig.event(stored(1, RecordKey::Ban(1)));
+    rig.event(stored_event(1, RecordKey::Ban(1)));
     rig.check(
         unban("node-1"),
         &["answer 8: host `node-1` is not banned; `osteon workers` lists those that are"],
@@ -133,10 +133,10 @@ fn a_ban_lasts_until_it_is_lifted() {
 fn two_that_agree_are_no_majority_of_five() {
     let mut rig = rig(1, 5);
     // Hosts 1 and 3 are broken in the same way.
-    rig.check(wrong(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
+    rig.check(wrong_answer(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
     // Two votes are lacking, of three hosts that can give them.
     rig.check(answer(2, 2, 0, 1), &["send 3: batch 3 = 0+1", "send 4: batch 4 = 0+1"]);
-    rig.check(wrong(3, 3, 0, ONE_BIT), &[]);
+    rig.check(wrong_answer(3, 3, 0, ONE_BIT), &[]);
     rig.check(answer(4, 4, 0, 1), &["send 5: batch 5 = 0+1"]);
     let effects = rig.event(answer(5, 5, 0, 1));
     for (at, host) in ["node-1", "node-3"].into_iter().enumerate() {
@@ -171,7 +171,7 @@ const JUDGED: &str = "answered realization 0 of job 1 with 3900.0000000000005 m/
 #[test]
 fn a_third_worker_decides_against_the_first() {
     let mut rig = rig(1, 3);
-    rig.check(wrong(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
+    rig.check(wrong_answer(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
     rig.check(answer(2, 2, 0, 1), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
     // The wrong answer filled the result: the evaluation begins again.
@@ -192,7 +192,7 @@ fn a_third_worker_decides_against_the_first() {
 fn a_third_worker_decides_against_the_second() {
     let mut rig = rig(1, 3);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
-    rig.check(wrong(2, 2, 0, ONE_BIT), &["send 3: batch 3 = 0+1"]);
+    rig.check(wrong_answer(2, 2, 0, ONE_BIT), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
     assert_eq!(effects.len(), 3, "{effects:?}");
     let banned = format!("store ban 1: node-2 (process 2) {JUDGED}");
@@ -207,7 +207,7 @@ fn an_estimated_error_is_an_answer_too() {
     let mut rig = rig(1, 3);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
     let off = RealizationResult::solved(0.0, 1e-9);
-    rig.check(wrong(2, 2, 0, off), &["send 3: batch 3 = 0+1"]);
+    rig.check(wrong_answer(2, 2, 0, off), &["send 3: batch 3 = 0+1"]);
     let effects = rig.event(answer(3, 3, 0, 1));
     assert!(effects[0].starts_with("store ban 1: node-2 (process 2)"), "{effects:?}");
 }
@@ -216,7 +216,7 @@ fn an_estimated_error_is_an_answer_too() {
 fn of_two_workers_none_is_believed() {
     let mut rig = rig(1, 2);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
-    rig.check(wrong(2, 2, 0, ONE_BIT), &[]);
+    rig.check(wrong_answer(2, 2, 0, ONE_BIT), &[]);
     for worker in [1, 2] {
         rig.heartbeat(worker);
     }
@@ -246,7 +246,7 @@ fn of_two_workers_none_is_believed() {
 fn a_third_worker_that_comes_in_time_decides() {
     let mut rig = rig(1, 2);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
-    rig.check(wrong(2, 2, 0, ONE_BIT), &[]);
+    rig.check(wrong_answer(2, 2, 0, ONE_BIT), &[]);
     // Another stay of one of the two processes does not count as a third worker.
     rig.check(hello_of(3, 2, 1), &["welcome 3, lease 3"]);
     rig.check(hello_of(4, 4, 1), &["welcome 4, lease 4", "send 4: batch 3 = 0+1"]);
@@ -264,7 +264,7 @@ fn a_copy_that_answers_differently_is_judged() {
     rig.check_after(Duration::from_millis(100), &copies);
     // Nobody else has answered anything, so worker 2 gets the other one, too.
     let effects = ["revoke 1: batch 1", "send 2: batch 5 = 1+1"];
-    rig.check(wrong(2, 3, 0, ONE_BIT), &effects);
+    rig.check(wrong_answer(2, 3, 0, ONE_BIT), &effects);
     // The answer of worker 1 had been sent already.
     rig.check(answer(1, 1, 0, 1), &["send 3: batch 6 = 0+1"]);
     let effects = rig.event(answer(3, 6, 0, 1));

@@ -30,13 +30,13 @@ fn steps(completion: Completion) -> [Event; 2] {
 fn what_is_completed_aside_is_stored_and_ends_as_ever() {
     let mut plain = Rig::with(4, &[4]);
     plain.event(answer(1, 1, 0, 4));
-    plain.event(stored(1, RecordKey::Evaluation(0)));
+    plain.event(stored_event(1, RecordKey::Evaluation(0)));
     let digest = |rig: &Rig| rig.state.jobs[&JobId(1)].search.summary();
     for durable_first in [false, true] {
         let (mut aside, completion) = rig(propagation(4));
         let [gathered, completed] = steps(completion);
         aside.check(gathered.clone(), &["store job 1 evaluation 0"]);
-        let durable = stored(1, RecordKey::Evaluation(0));
+        let durable = stored_event(1, RecordKey::Evaluation(0));
         let (one, other) =
             if durable_first { (durable, completed.clone()) } else { (completed.clone(), durable) };
         aside.check(one, &[]);
@@ -54,7 +54,7 @@ fn a_search_goes_on_with_what_was_completed_aside() {
         let (mut rig, completion) = rig(identification(4));
         let [gathered, completed] = steps(completion);
         rig.check(gathered, &["store job 1 evaluation 0"]);
-        let durable = stored(1, RecordKey::Evaluation(0));
+        let durable = stored_event(1, RecordKey::Evaluation(0));
         let (one, other) = if durable_first { (durable, completed) } else { (completed, durable) };
         rig.check(one, &[]);
         rig.check(other, &["send 1: batch 2 = 0+4"]);
@@ -71,7 +71,7 @@ fn what_the_store_refuses_while_the_search_takes_it_in_is_written_again() {
     rig.check(completed, &[]);
     rig.now += rig.state.config.store_retry;
     assert!(rig.event(Event::Tick).contains(&"store job 1 evaluation 0".to_owned()));
-    assert_eq!(rig.event(stored(1, key)), ["store job 1 end: converged "]);
+    assert_eq!(rig.event(stored_event(1, key)), ["store job 1 end: converged "]);
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn a_job_is_computed_again_if_a_worker_is_banned_after_the_evaluation_is_durable
     let (mut rig, completion) = rig(propagation(4));
     let [gathered, completed] = steps(completion);
     rig.event(gathered);
-    rig.event(stored(1, RecordKey::Evaluation(0)));
+    rig.event(stored_event(1, RecordKey::Evaluation(0)));
     let worker = WorkerName::new("node", 42, 0);
     bans::ban(&mut Turn::new(&mut rig.state, rig.now), &worker, JobId(1), "lies".to_owned());
     let after = rig.event(completed);
@@ -121,7 +121,7 @@ fn a_job_that_is_cancelled_while_its_search_is_told_ends_after_that() {
     let (mut rig, completion) = rig(identification(4));
     let [gathered, completed] = steps(completion);
     rig.event(gathered);
-    rig.check(stored(1, RecordKey::Evaluation(0)), &[]);
+    rig.check(stored_event(1, RecordKey::Evaluation(0)), &[]);
     rig.check(request(1, Request::Cancel(JobId(1))), &[]);
     assert_eq!(rig.event(completed), ["store job 1 end: cancelled "]);
 }
@@ -132,6 +132,6 @@ fn a_stop_waits_for_what_is_being_completed() {
     let [gathered, completed] = steps(completion);
     assert!(!rig.event(Event::Drain).contains(&"stop".to_owned()));
     rig.check(gathered, &["store job 1 evaluation 0"]);
-    rig.check(stored(1, RecordKey::Evaluation(0)), &[]);
+    rig.check(stored_event(1, RecordKey::Evaluation(0)), &[]);
     rig.check(completed, &["store job 1 end: converged "]);
 }

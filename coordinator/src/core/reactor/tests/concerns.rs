@@ -7,7 +7,7 @@ use crate::core::notice::Notice;
 
 impl Rig {
     /// Lets a second pass; returns what the log is told.
-    fn told(&mut self) -> Vec<String> {
+    fn told_concerns(&mut self) -> Vec<String> {
         self.now += Duration::from_secs(1);
         let effects = react(&mut self.state, Event::Tick, self.now).into_iter();
         let told = effects.filter_map(|effect| match effect {
@@ -33,19 +33,22 @@ fn a_bound_that_is_half_used_is_told_once_and_shown_while_it_is() {
     let most = JOBS_MAX as u64;
     let connections = |open| Event::Connections { open, most };
     rig.event(connections(most / 2 - 1));
-    assert_eq!((rig.told(), rig.concerns()), (vec![], vec![]));
+    assert_eq!((rig.told_concerns(), rig.concerns()), (vec![], vec![]));
     let half = "5000 of at most 10000 connections are open; more have to wait";
     rig.event(connections(most / 2));
-    assert_eq!((rig.told(), rig.concerns()), (vec![half.to_owned()], vec![half.to_owned()]));
+    assert_eq!(
+        (rig.told_concerns(), rig.concerns()),
+        (vec![half.to_owned()], vec![half.to_owned()])
+    );
     // It goes up and down around the half.
     for open in [most / 2 - 1, most / 2, most / 2 - 1000, most / 2] {
         rig.event(connections(open));
-        assert_eq!(rig.told(), [""; 0], "{open}");
+        assert_eq!(rig.told_concerns(), [""; 0], "{open}");
     }
     rig.event(connections(most / 4));
-    assert_eq!((rig.told(), rig.concerns()), (vec![], vec![]));
+    assert_eq!((rig.told_concerns(), rig.concerns()), (vec![], vec![]));
     rig.event(connections(most / 2));
-    assert_eq!(rig.told(), [half]);
+    assert_eq!(rig.told_concerns(), [half]);
 }
 
 #[test]
@@ -73,8 +76,8 @@ fn a_store_that_refuses_is_a_concern_until_it_stores_something() {
     rig.now += Duration::from_secs(7);
     let expected = "the store has refused records for 7 s, and stored none since: the disk is full";
     assert_eq!(rig.concerns(), [expected]);
-    assert_eq!(rig.told().len(), 1);
-    assert_eq!(rig.told(), [""; 0]);
+    assert_eq!(rig.told_concerns().len(), 1);
+    assert_eq!(rig.told_concerns(), [""; 0]);
     rig.accept(propagation(1));
     assert_eq!(rig.concerns(), [""; 0]);
 }
@@ -86,7 +89,7 @@ fn a_log_that_only_grows_is_a_concern_after_a_while() {
     rig.now += Duration::from_secs(59);
     assert_eq!(rig.concerns(), [""; 0]);
     rig.event(Event::LogStuck { bytes: 900 << 20 });
-    let [told] = &rig.told()[..] else { panic!("nothing is told") };
+    let [told] = &rig.told_concerns()[..] else { panic!("nothing is told") };
     assert!(told.contains("for 60 s and has 900 MiB"), "{told}");
     rig.event(Event::LogCopied);
     assert_eq!(rig.concerns(), [""; 0]);

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::core::reactor::dispatch::overdue::begin_probation;
-use crate::core::reactor::dispatch::sizing::{batch_size, fleet_rate, measured};
+use crate::core::reactor::dispatch::sizing::{batch_size, fleet_rate, measure_fleet};
 
 /// Checks the batch size for worker 1, with workers of `threads` measured at `rates` realizations
 /// per second, when `queued` realizations are left.
@@ -17,7 +17,7 @@ fn check_size_of(threads: &[u32], rates: &[Option<f64>], queued: (u64, u64), exp
         worker.rates.clear();
         worker.rates.extend(rate.map(|rate| (JobId(1), rate)));
     }
-    let fleet = measured(&rig.state, JobId(1));
+    let fleet = measure_fleet(&rig.state, JobId(1));
     let size = batch_size(&rig.state, &rig.state.workers[&WorkerId(1)], JobId(1), fleet, queued);
     assert_eq!(size, expected, "{threads:?} {rates:?} {queued:?}");
 }
@@ -79,7 +79,7 @@ fn batches_of_an_evaluation_are_equal_if_all_are_computed_at_once() {
         for worker in rig.state.workers.values_mut() {
             worker.rates.insert(JobId(1), 16_000.0);
         }
-        let fleet = measured(&rig.state, JobId(1));
+        let fleet = measure_fleet(&rig.state, JobId(1));
         let worker = &rig.state.workers[&WorkerId(1)];
         let size = batch_size(&rig.state, worker, JobId(1), fleet, (queued, 0));
         assert_eq!(size, expected, "{queued} for {workers}");
@@ -153,7 +153,7 @@ fn a_job_on_many_workers_begins_with_few_batches_of_unknown_duration() {
         effects.iter().filter_map(count).collect::<Vec<u64>>()
     };
     assert!(sends(submit(1, "", propagation(1_000_000))).is_empty());
-    assert_eq!(sends(stored(1, RecordKey::Job)), [8; 256]);
+    assert_eq!(sends(stored_event(1, RecordKey::Job)), [8; 256]);
     // 8 in 4 ms are 2000 per second.
     for batch in 1..8 {
         let first = 8 * (batch - 1);
@@ -177,11 +177,11 @@ fn workers_do_not_wait_for_long_until_the_duration_of_a_batch_is_known() {
         rig.event(event).iter().filter(|effect| effect.starts_with("send ")).count()
     };
     rig.event(submit(1, "", propagation(1_000_000)));
-    assert_eq!(sends(&mut rig, stored(1, RecordKey::Job)), 256);
+    assert_eq!(sends(&mut rig, stored_event(1, RecordKey::Job)), 256);
     rig.now += Duration::from_millis(20);
     assert_eq!(sends(&mut rig, Event::Tick), 0);
     rig.event(submit(2, "", propagation(16)));
-    assert_ne!(sends(&mut rig, stored(2, RecordKey::Job)), 0);
+    assert_ne!(sends(&mut rig, stored_event(2, RecordKey::Job)), 0);
     rig.now += Duration::from_millis(5);
     assert_eq!(sends(&mut rig, Event::Tick), 256);
     // Nothing is sent twice while some have got nothing yet, however late the first answers are.
@@ -203,7 +203,7 @@ fn a_worker_gets_no_second_batch_if_there_are_enough_workers() {
         rig.event(hello(worker, 2));
     }
     rig.event(submit(1, "", propagation(20_000)));
-    rig.event(stored(1, RecordKey::Job));
+    rig.event(stored_event(1, RecordKey::Job));
     let mut sent = Vec::new();
     for batch in 1..=8 {
         sent.extend(rig.event(answer_in(0.004, batch, batch, 8 * (batch - 1), 8)));
@@ -231,7 +231,7 @@ fn a_worker_on_probation_is_tried_although_there_are_enough_workers() {
     // It rests before it is tried.
     rig.now += Duration::from_secs(4);
     rig.event(submit(1, "", propagation(20_000)));
-    rig.event(stored(1, RecordKey::Job));
+    rig.event(stored_event(1, RecordKey::Job));
     for batch in 1..=8 {
         rig.event(answer_in(0.004, batch, batch, 8 * (batch - 1), 8));
     }

@@ -22,14 +22,17 @@ fn a_job_is_explained_from_its_acceptance_to_its_end() {
     rig.event(submit(0, "", propagation(8)));
     // Until it is durable, no client knows it.
     rig.check_reason(1, &Refusal::NoJob { job: JobId(1) }.to_string());
-    rig.event(stored(1, RecordKey::Job));
+    rig.event(stored_event(1, RecordKey::Job));
     rig.now += Duration::from_secs(9);
     rig.check_reason(1, "NoWorkers");
     assert_eq!(rig.facts(1).without_workers, Duration::from_secs(9));
     rig.event(hello(1, 8));
     rig.check_reason(1, "Computing");
     let facts = rig.facts(1);
-    assert_eq!((facts.slots, facts.slots_used, facts.queued, facts.left()), (8, 8.0, 0, 8));
+    assert_eq!(
+        (facts.slots, facts.slots_used, facts.queued, facts.lacking_realizations()),
+        (8, 8.0, 0, 8)
+    );
     rig.now += Duration::from_secs(2);
     rig.check_reason(1, "LastRealizations");
     let oldest = rig.facts(1).oldest.unwrap();
@@ -44,8 +47,8 @@ fn a_job_is_explained_from_its_acceptance_to_its_end() {
     let error = "full".to_owned();
     rig.event(Event::StoreFailed { job: JobId(1), key: RecordKey::Evaluation(0), error });
     rig.check_reason(1, "StoreRefuses");
-    rig.event(stored(1, RecordKey::Evaluation(0)));
-    rig.event(stored(1, RecordKey::End));
+    rig.event(stored_event(1, RecordKey::Evaluation(0)));
+    rig.event(stored_event(1, RecordKey::End));
     rig.check_reason(1, "Ended");
 }
 

@@ -4,7 +4,7 @@ use super::*;
 
 impl Rig {
     /// Submits and stores a job of a client.
-    fn accept_of(&mut self, client: &str, priority: u32, realizations: u64) -> JobId {
+    fn accept_for(&mut self, client: &str, priority: u32, realizations: u64) -> JobId {
         let Event::Requested { reply_id, request } = submit(0, "", propagation(realizations))
         else {
             panic!("no request");
@@ -17,7 +17,7 @@ impl Rig {
             Request::Submit { specification, request_id, client, priority, name: String::new() };
         let job = JobId(self.state.next_job);
         self.event(Event::Requested { reply_id, request });
-        self.event(stored(job.0, RecordKey::Job));
+        self.event(stored_event(job.0, RecordKey::Job));
         job
     }
 
@@ -41,10 +41,10 @@ fn large_evaluations_wait_for_room() {
     rig.state.config.active_jobs_max = 8;
     rig.state.config.active_realizations_max = 100;
     // A job of any size may begin if no other is active.
-    let large = rig.accept_of("a", 0, 150);
-    let second = rig.accept_of("a", 0, 1);
-    let other = rig.accept_of("b", 0, 50);
-    let later = rig.accept_of("c", 0, 1);
+    let large = rig.accept_for("a", 0, 150);
+    let second = rig.accept_for("a", 0, 1);
+    let other = rig.accept_for("b", 0, 50);
+    let later = rig.accept_for("c", 0, 1);
     let active = |rig: &Rig| rig.state.active.iter().copied().collect::<Vec<_>>();
     assert_eq!(active(&rig), [large, other]);
     rig.event(request(1, Request::Cancel(other)));
@@ -55,7 +55,7 @@ fn large_evaluations_wait_for_room() {
 
 #[test]
 fn what_waits_is_bounded_in_bytes() {
-    let of = |client: &str, velocities: usize| {
+    let submit_large = |client: &str, velocities: usize| {
         let mut specification = identification(1);
         specification.data = Some(Data::from_velocities(vec![3900.0; velocities]));
         let (specification, client) = (Arc::new(specification), client.to_owned());
@@ -73,7 +73,7 @@ fn what_waits_is_bounded_in_bytes() {
     let mut rig = Rig::new();
     rig.state.config.jobs_bytes_max = 420_000;
     let mut accepted = |client, velocities| {
-        let effects = rig.event(of(client, velocities));
+        let effects = rig.event(submit_large(client, velocities));
         if effects[0].starts_with("answer 0: the specifications of ") {
             return effects[0].split(' ').nth(6).map(str::to_owned);
         }
@@ -93,10 +93,10 @@ fn what_waits_is_bounded_in_bytes() {
     assert_eq!(accepted("e", 12_000), whose("jobs"));
     // A job that ends frees its bytes.
     let job = rig.state.jobs.keys().next_back().copied().unwrap();
-    rig.event(stored(job.0, RecordKey::Job));
+    rig.event(stored_event(job.0, RecordKey::Job));
     rig.event(request(1, Request::Cancel(job)));
-    rig.event(stored(job.0, RecordKey::End));
-    let effects = rig.event(of("e", 12_000));
+    rig.event(stored_event(job.0, RecordKey::End));
+    let effects = rig.event(submit_large("e", 12_000));
     assert!(effects[0].starts_with("store job "), "{effects:?}");
 }
 
@@ -105,7 +105,7 @@ fn a_client_with_one_job_gets_as_much_as_one_with_many() {
     let mut rig = Rig::new();
     rig.state.config.active_jobs_max = 8;
     for _ in 0..200 {
-        rig.accept_of("many", 0, 20_000);
+        rig.accept_for("many", 0, 20_000);
     }
     rig.event(hello(1, 1));
     for _ in 0..50 {
@@ -113,7 +113,7 @@ fn a_client_with_one_job_gets_as_much_as_one_with_many() {
     }
     // It comes late, finds the limit on active jobs reached, and its realizations take ten times as
     // long.
-    let one = rig.accept_of("one", 0, 20_000);
+    let one = rig.accept_for("one", 0, 20_000);
     let slowness = |job| if job == one { 10.0 } else { 1.0 };
     let mut time = [0.0; 2];
     for _ in 0..1000 {
@@ -128,9 +128,9 @@ fn a_client_with_one_job_gets_as_much_as_one_with_many() {
 fn of_one_client_the_highest_priority_goes_first_and_harms_no_other() {
     let mut rig = Rig::new();
     rig.state.config.active_jobs_max = 8;
-    let low = rig.accept_of("one", 1, 10_000);
-    let high = rig.accept_of("one", 2, 300);
-    let other = rig.accept_of("other", 0, 10_000);
+    let low = rig.accept_for("one", 1, 10_000);
+    let high = rig.accept_for("one", 2, 300);
+    let other = rig.accept_for("other", 0, 10_000);
     rig.event(hello(1, 1));
     let mut served: Vec<JobId> = (0..60).map(|_| rig.answer_one(|_| 1.0).0).collect();
     let done = served.iter().rposition(|job| *job == high).unwrap();
@@ -145,13 +145,13 @@ fn waiting_jobs_begin_in_the_order_of_priority_and_need() {
     let mut rig = Rig::new();
     let begun = |rig: &Rig| rig.state.active.iter().map(|id| id.0).collect::<Vec<_>>();
     for priority in [0, 0, 0, 5, 0] {
-        rig.accept_of("one", priority, 10);
+        rig.accept_for("one", priority, 10);
     }
     assert_eq!(begun(&rig), [1, 2]);
     // Clients without active jobs may exceed the limit.
-    rig.accept_of("second", 0, 10);
-    rig.accept_of("third", 0, 10);
-    rig.accept_of("fourth", 9, 10);
+    rig.accept_for("second", 0, 10);
+    rig.accept_for("third", 0, 10);
+    rig.accept_for("fourth", 9, 10);
     assert_eq!(begun(&rig), [1, 2, 6, 7]);
     let ends = [(6, vec![1, 2, 7, 8]), (7, vec![1, 2, 8]), (1, vec![2, 8]), (2, vec![4, 8])];
     for (ends, expected) in ends {

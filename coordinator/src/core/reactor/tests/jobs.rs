@@ -4,7 +4,7 @@ use osteon_common::limits::{CLIENT_SHARE_DIVISOR, JOBS_MAX};
 
 use super::*;
 
-fn store_failed(job: u64, key: RecordKey) -> Event {
+fn not_stored_event(job: u64, key: RecordKey) -> Event {
     Event::StoreFailed { job: JobId(job), key, error: "the disk is full".to_owned() }
 }
 
@@ -14,15 +14,15 @@ fn nothing_is_said_before_it_is_durable() {
     rig.check(hello(1, 1), &["welcome 1, lease 1"]);
     rig.check(submit(7, "", propagation(2)), &["store job 1"]);
     rig.check(
-        stored(1, RecordKey::Job),
+        stored_event(1, RecordKey::Job),
         &["answer 7: job 1", "send 1: batch 1 = 0+1", "send 1: batch 2 = 1+1"],
     );
     rig.check(answer(1, 2, 1, 1), &[]);
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
-    rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
+    rig.check(stored_event(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
     let fetch = || request(8, Request::Fetch(JobId(1)));
     rig.check(fetch(), &["answer 8: job 1 has not ended"]);
-    rig.check(stored(1, RecordKey::End), &["publish 1"]);
+    rig.check(stored_event(1, RecordKey::End), &["publish 1"]);
     rig.check(fetch(), &["answer 8: ended 1"]);
     assert!(rig.state.is_idle());
 }
@@ -33,9 +33,9 @@ fn a_search_goes_to_its_next_point_when_the_last_is_durable() {
     rig.accept(identification(1));
     rig.check(hello(1, 1), &["welcome 1, lease 1", "send 1: batch 1 = 0+1"]);
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
-    rig.check(stored(1, RecordKey::Evaluation(0)), &["send 1: batch 2 = 0+1"]);
+    rig.check(stored_event(1, RecordKey::Evaluation(0)), &["send 1: batch 2 = 0+1"]);
     // A repeated report is ignored.
-    rig.check(stored(1, RecordKey::Evaluation(0)), &[]);
+    rig.check(stored_event(1, RecordKey::Evaluation(0)), &[]);
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn a_submission_is_idempotent_by_its_request_id() {
     rig.check(submit(1, "r", propagation(2)), &["store job 1"]);
     // Before and after the job is durable.
     rig.check(submit(2, "r", propagation(2)), &[]);
-    rig.check(stored(1, RecordKey::Job), &["answer 1: job 1", "answer 2: job 1"]);
+    rig.check(stored_event(1, RecordKey::Job), &["answer 1: job 1", "answer 2: job 1"]);
     rig.check(submit(3, "r", propagation(2)), &["answer 3: job 1"]);
     let refusal = "answer 4: request id `r` belongs to job 1, which has another specification; \
                    choose another request id";
@@ -56,7 +56,7 @@ fn a_submission_is_idempotent_by_its_request_id() {
 
 #[test]
 fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
-    let of = |reply_id, client: &str, realizations| {
+    let submit_as = |reply_id, client: &str, realizations| {
         let Event::Requested { reply_id, request } =
             submit(reply_id, "r", propagation(realizations))
         else {
@@ -71,14 +71,14 @@ fn clients_that_choose_the_same_request_id_have_jobs_of_their_own() {
         Event::Requested { reply_id, request }
     };
     let mut rig = Rig::new();
-    rig.check(of(1, "ann", 2), &["store job 1"]);
-    rig.check(of(2, "bob", 3), &["store job 2"]);
-    rig.check(stored(1, RecordKey::Job), &["answer 1: job 1"]);
-    rig.check(stored(2, RecordKey::Job), &["answer 2: job 2"]);
-    rig.check(of(3, "ann", 2), &["answer 3: job 1"]);
-    rig.check(of(4, "bob", 3), &["answer 4: job 2"]);
+    rig.check(submit_as(1, "ann", 2), &["store job 1"]);
+    rig.check(submit_as(2, "bob", 3), &["store job 2"]);
+    rig.check(stored_event(1, RecordKey::Job), &["answer 1: job 1"]);
+    rig.check(stored_event(2, RecordKey::Job), &["answer 2: job 2"]);
+    rig.check(submit_as(3, "ann", 2), &["answer 3: job 1"]);
+    rig.check(submit_as(4, "bob", 3), &["answer 4: job 2"]);
     // An id of one client may be used by another.
-    rig.check(of(5, "cem", 4), &["store job 3"]);
+    rig.check(submit_as(5, "cem", 4), &["store job 3"]);
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn a_job_that_cannot_be_stored_is_not_accepted() {
     let mut rig = Rig::new();
     rig.check(submit(1, "r", propagation(2)), &["store job 1"]);
     let refusal = "answer 1: the job could not be stored and is not accepted: the disk is full";
-    rig.check(store_failed(1, RecordKey::Job), &[refusal]);
+    rig.check(not_stored_event(1, RecordKey::Job), &[refusal]);
     rig.check(submit(2, "r", propagation(2)), &["store job 2"]);
 }
 
@@ -94,7 +94,8 @@ fn a_job_that_cannot_be_stored_is_not_accepted() {
 fn another_record_is_written_again_until_it_is_durable() {
     let mut rig = Rig::with(1, &[1]);
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
-    let (failed, retry) = (|| store_failed(1, RecordKey::Evaluation(0)), Duration::from_secs(2));
+    let (failed, retry) =
+        (|| not_stored_event(1, RecordKey::Evaluation(0)), Duration::from_secs(2));
     rig.check(failed(), &[]);
     rig.check_after(retry / 2, &[]);
     let snapshot = crate::core::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
@@ -110,7 +111,7 @@ fn another_record_is_written_again_until_it_is_durable() {
         rig.check_after(retry, &["store job 1 evaluation 0"]);
     }
     rig.check(request(1, Request::Get(JobId(1))), &["answer 1: Running Unspecified"]);
-    rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
+    rig.check(stored_event(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
 }
 
 #[test]
@@ -118,12 +119,12 @@ fn an_end_that_is_not_durable_is_none() {
     let mut rig = Rig::with(8, &[]);
     rig.check(request(7, Request::Cancel(JobId(1))), &["store job 1 end: cancelled "]);
     for _ in 0..1000 {
-        rig.check(store_failed(1, RecordKey::End), &[]);
+        rig.check(not_stored_event(1, RecordKey::End), &[]);
         rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
     }
     let refusal = "answer 8: job 1 has not ended";
     rig.check(request(8, Request::Fetch(JobId(1))), &[refusal]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
+    rig.check(stored_event(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
 }
 
 #[test]
@@ -132,12 +133,12 @@ fn a_store_that_refuses_for_too_long_is_despaired_of_and_tried_on() {
     rig.state.config.store_give_up_after = Some(Duration::from_secs(4));
     rig.event(request(7, Request::Cancel(JobId(1))));
     for _ in 0..2 {
-        rig.check(store_failed(1, RecordKey::End), &[]);
+        rig.check(not_stored_event(1, RecordKey::End), &[]);
         rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
     }
-    rig.check(store_failed(1, RecordKey::End), &["give_up after 4s: the disk is full"]);
+    rig.check(not_stored_event(1, RecordKey::End), &["give_up after 4s: the disk is full"]);
     rig.check_after(Duration::from_secs(2), &["store job 1 end: cancelled "]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
+    rig.check(stored_event(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
 }
 
 #[test]
@@ -147,7 +148,7 @@ fn a_cancelled_job_ends_when_its_end_is_durable() {
     rig.check(cancel(), &["store job 1 end: cancelled ", "revoke 1: batch 1", "revoke 1: batch 2"]);
     // The answer to a revoked batch may have been sent already.
     rig.check(answer(1, 1, 0, 2), &[]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
+    rig.check(stored_event(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
     rig.check(cancel(), &["answer 7: Ended Cancelled"]);
     let refusal = "answer 7: no such job: 9";
     rig.check(request(7, Request::Cancel(JobId(9))), &[refusal]);
@@ -160,8 +161,8 @@ fn a_job_cancelled_while_an_evaluation_is_stored_keeps_the_evaluation() {
     rig.event(hello(1, 1));
     rig.check(answer(1, 1, 0, 1), &["store job 1 evaluation 0"]);
     rig.check(request(7, Request::Cancel(JobId(1))), &[]);
-    rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: cancelled "]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
+    rig.check(stored_event(1, RecordKey::Evaluation(0)), &["store job 1 end: cancelled "]);
+    rig.check(stored_event(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
     let snapshot = crate::core::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.evaluations, 1);
 }
@@ -191,7 +192,7 @@ fn jobs_are_bounded() {
     for client in ["a", "b", "c", ""] {
         for _ in 0..share {
             let job = JobId(rig.state.next_job);
-            react(&mut rig.state, submit_of(client, 1, "", propagation(1)), rig.now);
+            react(&mut rig.state, submit_for(client, 1, "", propagation(1)), rig.now);
             react(&mut rig.state, Event::Stored { job, key: RecordKey::Job }, rig.now);
         }
         if client == "a" {
@@ -199,15 +200,15 @@ fn jobs_are_bounded() {
             let refusal = "answer 1: 2500 jobs of the client \"a\" wait or run already, the most that one \
                            client may have of the 10000 of all; submit again when some have ended, or \
                            cancel some";
-            rig.check(submit_of("a", 1, "", propagation(1)), &[refusal]);
+            rig.check(submit_for("a", 1, "", propagation(1)), &[refusal]);
         }
     }
     let refusal = "answer 1: 10000 jobs of all clients wait or run already, the most allowed; submit again \
                    when some have ended";
-    rig.check(submit_of("e", 1, "", propagation(1)), &[refusal]);
+    rig.check(submit_for("e", 1, "", propagation(1)), &[refusal]);
     rig.event(request(2, Request::Cancel(JobId(5))));
-    rig.event(stored(5, RecordKey::End));
-    rig.check(submit_of("a", 1, "", propagation(1)), &["store job 10001"]);
+    rig.event(stored_event(5, RecordKey::End));
+    rig.check(submit_for("a", 1, "", propagation(1)), &["store job 10001"]);
 }
 
 #[test]
@@ -267,7 +268,7 @@ fn a_drained_coordinator_stops_when_everything_is_stored() {
     rig.check(submit(4, "", propagation(2)), &[refusal]);
     let closed = "close 2: the coordinator is shutting down; attach again when it is back";
     rig.check(hello(2, 1), &[closed]);
-    rig.check(stored(2, RecordKey::Job), &["answer 3: job 2"]);
-    rig.check(stored(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
-    rig.check(stored(1, RecordKey::End), &["publish 1", "stop"]);
+    rig.check(stored_event(2, RecordKey::Job), &["answer 3: job 2"]);
+    rig.check(stored_event(1, RecordKey::Evaluation(0)), &["store job 1 end: converged "]);
+    rig.check(stored_event(1, RecordKey::End), &["publish 1", "stop"]);
 }

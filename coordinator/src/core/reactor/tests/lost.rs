@@ -36,7 +36,7 @@ fn deadly() -> Rig {
 fn work(rig: &mut Rig, worker: u64) -> Vec<String> {
     let mut effects = Vec::new();
     for _ in 0..4 {
-        for (batch, Assignment { indices, .. }) in held(rig, worker, JobId(2)) {
+        for (batch, Assignment { indices, .. }) in batches_held(rig, worker, JobId(2)) {
             effects.extend(rig.event(answer(worker, batch, indices.first, indices.count)));
         }
     }
@@ -44,7 +44,7 @@ fn work(rig: &mut Rig, worker: u64) -> Vec<String> {
 }
 
 /// Returns the batches that a worker holds of a job.
-fn held(rig: &Rig, worker: u64, job: JobId) -> Vec<(u64, Assignment)> {
+fn batches_held(rig: &Rig, worker: u64, job: JobId) -> Vec<(u64, Assignment)> {
     let of_worker = rig.state.batches.iter().filter(|(_, it)| it.worker == WorkerId(worker));
     let batches = of_worker.map(|(id, batch)| (id.0, batch.assignment));
     batches.filter(|(_, assignment)| assignment.job == job).collect()
@@ -55,7 +55,7 @@ fn held(rig: &Rig, worker: u64, job: JobId) -> Vec<(u64, Assignment)> {
 fn die(rig: &mut Rig, host: &str, worker: u64) {
     rig.event(hello_on(host, worker, worker as u32, 1));
     work(rig, worker);
-    assert_eq!(held(rig, worker, JobId(1)).len(), 1, "{worker}");
+    assert_eq!(batches_held(rig, worker, JobId(1)).len(), 1, "{worker}");
     assert_eq!(rig.event(end_of_stream(worker)), [""; 0]);
 }
 
@@ -99,7 +99,7 @@ fn a_realization_that_was_alone_on_three_lost_workers_fails_its_job() {
 /// Worker 5 computes the realization that others were lost over.
 fn worker_5_finishes_the_evaluation(rig: &mut Rig) {
     work(rig, 5);
-    let batch = held(rig, 5, JobId(1))[0].0;
+    let batch = batches_held(rig, 5, JobId(1))[0].0;
     let effects = rig.event(answer(5, batch, 0, 1));
     assert_eq!(effects[0], "store job 1 evaluation 0", "{effects:?}");
 }
@@ -181,7 +181,7 @@ fn check_bad_node(host: &str, bad: &str, works: bool) {
         if worker % 5 == 0 {
             work(&mut rig, 2);
         }
-        if let Some((batch, _)) = held(&rig, 2, JobId(1)).first() {
+        if let Some((batch, _)) = batches_held(&rig, 2, JobId(1)).first() {
             let effects = rig.event(answer(2, *batch, 0, 1));
             assert_eq!(effects[0], "store job 1 evaluation 0", "{effects:?}");
             return;

@@ -49,12 +49,12 @@ fn a_job_is_told_when_it_is_accepted_starts_and_ends() {
         priority: 3,
     };
     let started = Notice::JobStarted { job, stored: 0 };
-    assert_eq!(rig.notices(stored(1, RecordKey::Job)), [accepted, started]);
+    assert_eq!(rig.notices(stored_event(1, RecordKey::Job)), [accepted, started]);
     rig.notices(hello(1, 1));
     assert_eq!(rig.notices(answer(1, 1, 0, 1)), []);
-    assert_eq!(rig.notices(stored(1, RecordKey::Evaluation(0))), []);
+    assert_eq!(rig.notices(stored_event(1, RecordKey::Evaluation(0))), []);
     rig.now += Duration::from_secs(7);
-    let told = rig.notices(stored(1, RecordKey::End));
+    let told = rig.notices(stored_event(1, RecordKey::End));
     let [Notice::JobEnded { client, kind, ending, evaluations, elapsed, .. }] = &told[..] else {
         panic!("{told:?}");
     };

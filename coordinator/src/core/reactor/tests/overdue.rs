@@ -1,6 +1,6 @@
 //! Workers that send heartbeats but do not answer.
 
-use super::checks::{ONE_BIT, wrong};
+use super::checks::{ONE_BIT, wrong_answer};
 use super::*;
 use crate::core::batch::Purpose;
 use crate::core::indices::Indices;
@@ -18,13 +18,13 @@ fn rig(realizations: u64, workers: u64, audit_fraction: f64) -> Rig {
     rig.state.config.audit_fraction = audit_fraction;
     rig.accept(propagation(realizations));
     for worker in 1..=workers {
-        rig.event(on_its_own(worker));
+        rig.event(hello_on_own_host(worker));
     }
     rig
 }
 
 /// Returns the hello event of a worker of one thread on a host of its own.
-fn on_its_own(worker: u64) -> Event {
+fn hello_on_own_host(worker: u64) -> Event {
     hello_on(&format!("host {worker}"), worker, worker as u32, 1)
 }
 
@@ -66,7 +66,7 @@ fn a_first_answer_that_is_overdue_twice_is_computed_by_a_third_worker() {
     assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 3: batch 3 = 0+1"]);
     // The next duplicate may take twice as long.
-    rig.event(on_its_own(4));
+    rig.event(hello_on_own_host(4));
     assert_eq!(rig.live(2 * OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 4: batch 4 = 0+1"]);
     let waits = "the answer of host 1 (process 1) to 1 realizations (since 9 s); 3 others compute the \
@@ -81,7 +81,7 @@ fn a_first_answer_that_is_overdue_twice_is_computed_by_a_third_worker() {
 fn an_overdue_audit_goes_to_another_worker_but_not_to_whom_it_checks() {
     let mut rig = rig(1, 2, 1.0);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
-    rig.event(on_its_own(3));
+    rig.event(hello_on_own_host(3));
     assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 3: batch 3 = 0+1"]);
     assert!(matches!(rig.batch(3).purpose, Purpose::Audit { .. }));
@@ -122,7 +122,7 @@ fn an_audit_that_two_workers_do_not_answer_is_given_up() {
     let mut rig = rig(1, 2, 1.0);
     rig.check(answer(1, 1, 0, 1), &["send 2: batch 2 = 0+1"]);
     for worker in 3..=4 {
-        rig.event(on_its_own(worker));
+        rig.event(hello_on_own_host(worker));
     }
     assert_eq!(rig.live(OVERDUE), ["send 3: batch 3 = 0+1"]);
     assert_eq!(rig.live(2 * OVERDUE - SECOND / 10), [""; 0]);
@@ -133,14 +133,14 @@ fn an_audit_that_two_workers_do_not_answer_is_given_up() {
 #[test]
 fn an_overdue_vote_goes_to_a_worker_that_has_not_voted() {
     let mut rig = rig(1, 3, 1.0);
-    rig.check(wrong(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
+    rig.check(wrong_answer(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
     rig.check(answer(2, 2, 0, 1), &["send 3: batch 3 = 0+1"]);
     // Workers 1 and 2 are idle, and have voted already.
     assert_eq!(rig.live(OVERDUE), [""; 0]);
     let waits = "a third worker, which decides between two whose answers differ (since 3 s); host 3 \
                  (process 3) is asked";
     assert_eq!(rig.waits_for(), waits);
-    rig.check(on_its_own(4), &["welcome 4, lease 4", "send 4: batch 4 = 0+1"]);
+    rig.check(hello_on_own_host(4), &["welcome 4, lease 4", "send 4: batch 4 = 0+1"]);
     assert_eq!(rig.batch(4).purpose, Purpose::TieBreak);
     let effects = rig.event(answer(4, 4, 0, 1));
     assert_eq!(effects[0], "revoke 3: batch 3");
@@ -150,7 +150,7 @@ fn an_overdue_vote_goes_to_a_worker_that_has_not_voted() {
 #[test]
 fn a_vote_of_a_worker_that_does_not_answer_is_not_waited_for_without_end() {
     let mut rig = rig(1, 3, 1.0);
-    rig.check(wrong(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
+    rig.check(wrong_answer(1, 1, 0, ONE_BIT), &["send 2: batch 2 = 0+1"]);
     rig.check(answer(2, 2, 0, 1), &["send 3: batch 3 = 0+1"]);
     assert_eq!(rig.live(60 * SECOND - SECOND / 10), [""; 0]);
     let effects = rig.live(SECOND / 10);
@@ -162,7 +162,7 @@ fn a_vote_of_a_worker_that_does_not_answer_is_not_waited_for_without_end() {
 fn with_quarantined_realization() -> Rig {
     let mut rig = rig(1, 1, 0.0);
     rig.check(end_of_stream(1), &[]);
-    rig.check(on_its_own(2), &["welcome 2, lease 2", "send 2: batch 2 = 0+1"]);
+    rig.check(hello_on_own_host(2), &["welcome 2, lease 2", "send 2: batch 2 = 0+1"]);
     assert_eq!(rig.batch(2).purpose, Purpose::Exclusive);
     rig
 }
@@ -170,13 +170,13 @@ fn with_quarantined_realization() -> Rig {
 #[test]
 fn an_overdue_quarantined_realization_goes_alone_to_another_worker() {
     let mut rig = with_quarantined_realization();
-    rig.check(on_its_own(3), &["welcome 3, lease 3"]);
+    rig.check(hello_on_own_host(3), &["welcome 3, lease 3"]);
     assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 3: batch 3 = 0+1"]);
     assert_eq!(rig.batch(3).purpose, Purpose::Exclusive);
     // A worker that holds it gets no other work.
     rig.event(submit(1, "", propagation(8)));
-    rig.check(stored(2, RecordKey::Job), &["answer 1: job 2"]);
+    rig.check(stored_event(2, RecordKey::Job), &["answer 1: job 2"]);
     let effects = rig.event(answer(3, 3, 0, 1));
     assert_eq!(effects[..2], ["revoke 2: batch 2", "store job 1 evaluation 0"]);
 }
@@ -185,9 +185,9 @@ fn an_overdue_quarantined_realization_goes_alone_to_another_worker() {
 fn a_busy_worker_is_not_refilled_until_it_may_have_an_overdue_quarantined_realization() {
     let mut rig = with_quarantined_realization();
     rig.event(submit(1, "", propagation(1000)));
-    rig.event(stored(2, RecordKey::Job));
+    rig.event(stored_event(2, RecordKey::Job));
     let expected = ["welcome 3, lease 3", "send 3: batch 3 = 0+4", "send 3: batch 4 = 4+4"];
-    rig.check(on_its_own(3), &expected);
+    rig.check(hello_on_own_host(3), &expected);
     assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), [""; 0]);
     rig.check(answer(3, 3, 0, 4), &[]);
@@ -198,7 +198,7 @@ fn a_busy_worker_is_not_refilled_until_it_may_have_an_overdue_quarantined_realiz
 #[test]
 fn a_crash_over_a_duplicate_of_a_quarantined_realization_counts() {
     let mut rig = with_quarantined_realization();
-    rig.event(on_its_own(3));
+    rig.event(hello_on_own_host(3));
     rig.live(OVERDUE);
     rig.check(end_of_stream(3), &[]);
     let evaluation = rig.state.jobs[&JobId(1)].evaluation().unwrap();
@@ -213,7 +213,7 @@ fn with_a_silent_worker_and_a_failing_host() -> Rig {
     for process in 100..103 {
         rig.state.count_loss(&WorkerName::new("host 3", process, 0), rig.now);
     }
-    rig.check(on_its_own(3), &["welcome 3, lease 3"]);
+    rig.check(hello_on_own_host(3), &["welcome 3, lease 3"]);
     rig
 }
 
@@ -259,15 +259,15 @@ fn what_was_computed_ahead_and_not_answered_is_overdue_when_it_is_asked_for() {
     rig.state.config.speculation = true;
     rig.accept(identification(1));
     for worker in 1..=2 {
-        rig.event(on_its_own(worker));
+        rig.event(hello_on_own_host(worker));
     }
     // Worker 2 holds a speculative batch, and does not answer; nor does worker 1, which gets a
     // duplicate in a moment.
     assert_eq!(rig.batch(2).purpose, Purpose::Speculative);
     assert_eq!(rig.event(answer(1, 1, 0, 1))[0], "store job 1 evaluation 0");
-    rig.event(stored(1, RecordKey::Evaluation(0)));
+    rig.event(stored_event(1, RecordKey::Evaluation(0)));
     rig.live(SECOND / 10);
-    rig.event(on_its_own(3));
+    rig.event(hello_on_own_host(3));
     let holders = |rig: &Rig| -> Vec<u64> {
         let others = &rig.batch(2).duplicates;
         others.iter().map(|id| rig.state.batches[id].worker.0).collect()
@@ -299,9 +299,9 @@ fn where_other_work_waits_a_job_has_one_copy_out_at_a_time() {
     let mut rig = rig(2, 1, 0.0);
     // Worker 1 holds both realizations of job 1, and does not answer.
     rig.event(submit(1, "", propagation(100_000)));
-    rig.event(stored(2, RecordKey::Job));
+    rig.event(stored_event(2, RecordKey::Job));
     let expected = ["welcome 2, lease 2", "send 2: batch 3 = 0+4", "send 2: batch 4 = 4+4"];
-    rig.check(on_its_own(2), &expected);
+    rig.check(hello_on_own_host(2), &expected);
     assert_eq!(rig.live(OVERDUE), [""; 0]);
     rig.check(answer_in(1e-3, 2, 3, 0, 4), &["send 2: batch 5 = 0+1"]);
     // The other batch waits for the result of this duplicate.
@@ -331,7 +331,7 @@ fn with_silent_worker() -> Rig {
     let mut rig = rig(1, 0, 0.0);
     rig.event(request(1, Request::Cancel(JobId(1))));
     for worker in 1..=2 {
-        rig.event(on_its_own(worker));
+        rig.event(hello_on_own_host(worker));
     }
     for _ in 0..100 {
         if rig.state.probation.has(&name(1)) {
@@ -364,8 +364,8 @@ fn one_job(rig: &mut Rig) -> (usize, u64) {
         }
     }
     assert!(!matches!(rig.state.jobs[&job].stage, Stage::Computing(_)), "{job} does not end");
-    rig.event(stored(job.0, RecordKey::Evaluation(0)));
-    rig.event(stored(job.0, RecordKey::End));
+    rig.event(stored_event(job.0, RecordKey::Evaluation(0)));
+    rig.event(stored_event(job.0, RecordKey::End));
     most
 }
 
@@ -434,7 +434,7 @@ fn who_does_not_answer_checks_nothing() {
 fn a_quarantined_realization_does_not_wait_for_who_does_not_answer() {
     let mut rig = with_silent_worker();
     rig.accept(propagation(1));
-    rig.event(on_its_own(3));
+    rig.event(hello_on_own_host(3));
     rig.check(end_of_stream(2), &[&format!("send 3: batch {} = 0+1", rig.state.next_batch)]);
 }
 
@@ -442,7 +442,7 @@ fn a_quarantined_realization_does_not_wait_for_who_does_not_answer() {
 fn who_is_on_probation_is_tried_with_what_is_overdue_where_nobody_else_is() {
     let mut rig = rig(1, 1, 0.0);
     rig.state.probation.miss(&name(2), rig.now, rig.now);
-    rig.event(on_its_own(2));
+    rig.event(hello_on_own_host(2));
     assert_eq!(rig.live(OVERDUE - SECOND / 10), [""; 0]);
     assert_eq!(rig.live(SECOND / 10), ["send 2: batch 2 = 0+1"]);
     rig.check(answer(2, 2, 0, 1), &["revoke 1: batch 1", "store job 1 evaluation 0"]);
@@ -476,8 +476,8 @@ fn without_another_worker_the_lease_ends_after_ten_minutes_and_the_next_begins_o
     let effects = rig.live(600 * SECOND);
     let closed = "close 1: this worker has not answered any of its batches for 600.1s";
     assert!(effects[0].starts_with(closed) && effects.len() == 1, "{effects:?}");
-    rig.check(on_its_own(1), &["welcome 1, lease 2", "send 1: batch 3 = 2+1"]);
-    rig.event(on_its_own(2));
+    rig.check(hello_on_own_host(1), &["welcome 1, lease 2", "send 1: batch 3 = 2+1"]);
+    rig.event(hello_on_own_host(2));
     let held = |worker| rig.state.workers[&WorkerId(worker)].in_flight.len();
     assert_eq!([1, 2].map(held), [1, 2]);
 }

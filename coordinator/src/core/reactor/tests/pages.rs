@@ -17,7 +17,7 @@ fn rig() -> Rig {
     for job in 1..=2 {
         rig.accept(propagation(1));
         rig.event(request(1, Request::Cancel(JobId(job))));
-        rig.event(stored(job, RecordKey::End));
+        rig.event(stored_event(job, RecordKey::End));
     }
     for _ in 3..=7 {
         rig.accept(propagation(1));
@@ -56,13 +56,13 @@ fn a_search_is_followed_row_by_row_until_it_has_ended() {
     rig.check(follow(1, 0, 10), &["answer 7: rows 0"]);
     for number in 0..2 {
         rig.event(answer(1, number + 1, 0, 1));
-        rig.event(stored(1, RecordKey::Evaluation(number)));
+        rig.event(stored_event(1, RecordKey::Evaluation(number)));
     }
     for (from, limit, count) in [(0, 10, 2), (0, 1, 1), (1, 10, 1), (2, 10, 0), (99, 10, 0)] {
         rig.check(follow(1, from, limit), &[&format!("answer 7: rows {count}")]);
     }
     rig.event(request(1, Request::Cancel(JobId(1))));
-    rig.event(stored(1, RecordKey::End));
+    rig.event(stored_event(1, RecordKey::End));
     rig.check(follow(1, 0, 10), &["answer 7: ended 1"]);
     rig.check(follow(2, 0, 10), &["answer 7: no such job: 2"]);
 }

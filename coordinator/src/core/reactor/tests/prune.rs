@@ -12,9 +12,9 @@ fn rig() -> Rig {
     for job in 1..=3 {
         rig.now += MINUTE;
         rig.event(submit(1, &format!("request {job}"), propagation(1)));
-        rig.event(stored(job, RecordKey::Job));
+        rig.event(stored_event(job, RecordKey::Job));
         rig.event(request(1, Request::Cancel(JobId(job))));
-        rig.event(stored(job, RecordKey::End));
+        rig.event(stored_event(job, RecordKey::End));
     }
     rig.accept(propagation(1));
     rig
@@ -24,7 +24,7 @@ fn prune(keep_for: Option<Duration>, keep_last: Option<u64>) -> Event {
     request(7, Request::Prune(Retention { keep_for, keep_last }))
 }
 
-fn pruned(jobs: &[u64], outcome: Result<(), String>) -> Event {
+fn pruned_event(jobs: &[u64], outcome: Result<(), String>) -> Event {
     let jobs = jobs.iter().map(|job| JobId(*job)).collect();
     Event::Pruned { reply_id: Some(ReplyId(7)), jobs, outcome }
 }
@@ -51,9 +51,9 @@ fn a_job_is_there_until_the_store_has_forgotten_it() {
     rig.check(prune(None, Some(1)), &["prune 1 2"]);
     rig.check(request(8, Request::Fetch(JobId(1))), &["answer 8: ended 1"]);
     let refusal = "answer 7: the store cannot delete the ended jobs; none was deleted: it is full";
-    rig.check(pruned(&[1, 2], Err("it is full".to_owned())), &[refusal]);
+    rig.check(pruned_event(&[1, 2], Err("it is full".to_owned())), &[refusal]);
     rig.check(request(8, Request::Fetch(JobId(1))), &["answer 8: ended 1"]);
-    rig.check(pruned(&[1, 2], Ok(())), &["answer 7: pruned 2"]);
+    rig.check(pruned_event(&[1, 2], Ok(())), &["answer 7: pruned 2"]);
     let gone = "answer 8: no such job: 1";
     rig.check(request(8, Request::Fetch(JobId(1))), &[gone]);
     // Its request id is free again, those of the others are not.

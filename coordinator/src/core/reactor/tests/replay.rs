@@ -19,7 +19,7 @@ fn rig(processes: &[u32], evaluations: u64) -> (Rig, MemoryStore) {
     let mut store = MemoryStore::new();
     rig.event(submit(0, "", identification(1)));
     store.put_job(&rig.state.jobs[&JobId(1)].record).unwrap();
-    rig.event(stored(1, RecordKey::Job));
+    rig.event(stored_event(1, RecordKey::Job));
     let turns = (0..evaluations).zip(processes.iter().cycle());
     for (worker, (number, process)) in (100..).zip(turns) {
         rig.event(hello_of(worker, *process, 1));
@@ -29,7 +29,7 @@ fn rig(processes: &[u32], evaluations: u64) -> (Rig, MemoryStore) {
         };
         store.put_evaluation(record, true).unwrap();
         rig.event(end_of_stream(worker));
-        rig.event(stored(1, RecordKey::Evaluation(number)));
+        rig.event(stored_event(1, RecordKey::Evaluation(number)));
     }
     (rig, store)
 }
@@ -85,7 +85,7 @@ fn a_store_that_cannot_be_read_is_asked_again() {
     let restored = Restored::load(&mut store).unwrap();
     let (state, _) = State::restore(Config::default(), restored, Duration::ZERO);
     let mut rig = Rig { state, now: Duration::ZERO };
-    rig.check(refused(0), &[]);
+    rig.check(read_refused_event(0), &[]);
     let snapshot = crate::core::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     let waits = "the store cannot read a record; retrying: the cable is out (since 0 s)";
     assert_eq!(snapshot.waiting_for, waits);
@@ -95,18 +95,18 @@ fn a_store_that_cannot_be_read_is_asked_again() {
 }
 
 /// Returns the event that the store could not be read.
-fn refused(number: u64) -> Event {
+fn read_refused_event(number: u64) -> Event {
     let found = Err(ReadFailure::Refused { error: "the cable is out".to_owned() });
     Event::Read { job: JobId(1), number, found }
 }
 
 /// Returns the event that the stored record is damaged.
-fn damaged(number: u64) -> Event {
+fn read_damaged_event(number: u64) -> Event {
     Event::Read { job: JobId(1), number, found: Err(ReadFailure::Damaged) }
 }
 
 /// Returns a restarted coordinator with worker 1, about to read the first evaluation of a job.
-fn restarted(store: &mut MemoryStore) -> Rig {
+fn restart(store: &mut MemoryStore) -> Rig {
     let restored = Restored::load(store).unwrap();
     let (state, _) = State::restore(Config::default(), restored, Duration::ZERO);
     let mut rig = Rig { state, now: Duration::ZERO };
@@ -117,15 +117,15 @@ fn restarted(store: &mut MemoryStore) -> Rig {
 #[test]
 fn a_damaged_evaluation_is_computed_again_and_no_other() {
     let (_, mut store) = rig(&[1], 3);
-    let mut rig = restarted(&mut store);
+    let mut rig = restart(&mut store);
     read(&mut rig, &store, 0);
-    rig.check(damaged(1), &["send 1: batch 1 = 0+1"]);
+    rig.check(read_damaged_event(1), &["send 1: batch 1 = 0+1"]);
     let effects = react(&mut rig.state, answer(1, 1, 1, 1), rig.now);
     let Effect::Store(Record::Evaluation { record, is_last: false }) = &effects[0] else {
         panic!("{effects:?}");
     };
     assert_eq!(record.outcomes, store.evaluation(JobId(1), 1).unwrap().unwrap().outcomes);
-    rig.check(stored(1, RecordKey::Evaluation(1)), &["read job 1 evaluation 2"]);
+    rig.check(stored_event(1, RecordKey::Evaluation(1)), &["read job 1 evaluation 2"]);
     assert_eq!(read(&mut rig, &store, 2), ["send 1: batch 2 = 0+1"]);
     assert_eq!(rig.state.jobs[&JobId(1)].search.evaluations(), 3);
 }
@@ -133,10 +133,10 @@ fn a_damaged_evaluation_is_computed_again_and_no_other() {
 #[test]
 fn what_came_of_a_damaged_evaluation_that_was_wrong_is_computed_again() {
     let (_, mut store) = rig(&[1], 3);
-    let mut rig = restarted(&mut store);
-    rig.check(damaged(0), &["send 1: batch 1 = 0+1"]);
+    let mut rig = restart(&mut store);
+    rig.check(read_damaged_event(0), &["send 1: batch 1 = 0+1"]);
     rig.event(answer(1, 1, 700, 1));
-    rig.check(stored(1, RecordKey::Evaluation(0)), &["read job 1 evaluation 1"]);
+    rig.check(stored_event(1, RecordKey::Evaluation(0)), &["read job 1 evaluation 1"]);
     // The search takes another path: the second evaluation is at the same point, the third is not.
     let mut number = 1;
     let next = |number| [format!("read job 1 evaluation {}", number + 1)];
@@ -155,7 +155,7 @@ fn what_came_of_a_damaged_evaluation_that_was_wrong_is_computed_again() {
     let old = store.evaluation(JobId(1), last).unwrap().unwrap().outcomes;
     // Only the first was wrong.
     assert_eq!((records[0].number, records[0].outcomes == old), (last, last > 0));
-    rig.event(stored(1, RecordKey::Evaluation(last)));
+    rig.event(stored_event(1, RecordKey::Evaluation(last)));
     assert_eq!(rig.state.jobs[&JobId(1)].stored, number);
     let batch = batch_of(&rig, JobId(1));
     let effects = react(&mut rig.state, answer(1, batch, number, 1), rig.now);
@@ -170,16 +170,16 @@ fn a_job_whose_evaluations_cannot_be_read_is_cancelled_at_once() {
     let end = ["store job 1 end: cancelled "];
     // Before the store has refused, after that, and when the stored record is damaged.
     let (_, mut store) = rig(&[1], 2);
-    let mut rig = restarted(&mut store);
+    let mut rig = restart(&mut store);
     rig.check(cancel(), &[]);
-    rig.check(refused(0), &end);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
-    let mut rig = restarted(&mut store);
-    rig.check(refused(0), &[]);
+    rig.check(read_refused_event(0), &end);
+    rig.check(stored_event(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
+    let mut rig = restart(&mut store);
+    rig.check(read_refused_event(0), &[]);
     rig.check(cancel(), &end);
-    let mut rig = restarted(&mut store);
+    let mut rig = restart(&mut store);
     rig.check(cancel(), &[]);
-    rig.check(damaged(0), &end);
+    rig.check(read_damaged_event(0), &end);
 }
 
 #[test]
@@ -193,7 +193,7 @@ fn a_job_that_is_cancelled_before_its_turn_leaves_what_is_stored() {
     rig.check(request(7, Request::Cancel(JobId(1))), &["read job 1 evaluation 0"]);
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
     assert_eq!(read(&mut rig, &store, 1), ["store job 1 end: cancelled "]);
-    rig.check(stored(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
+    rig.check(stored_event(1, RecordKey::End), &["answer 7: Ended Cancelled", "publish 1"]);
     let snapshot = crate::core::snapshot::job_snapshot(&rig.state, JobId(1), rig.now).unwrap();
     assert_eq!(snapshot.evaluations, 2);
 }
@@ -208,7 +208,7 @@ fn the_evaluations_of_a_banned_worker_are_computed_again() {
     rig.check_after(Duration::from_secs(2), &[]);
     rig.check(not_stored(2, RecordKey::Ban(1)), &[]);
     rig.check_after(Duration::ZERO, &[&effects[0]]);
-    rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
+    rig.check(stored_event(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
     assert_eq!(read(&mut rig, &store, 0), ["read job 1 evaluation 1"]);
     assert_eq!(read(&mut rig, &store, 1), [""; 0]);
     rig.event(hello_of(60, 3, 1));
@@ -220,7 +220,7 @@ fn the_evaluations_of_a_banned_worker_are_computed_again() {
     };
     let name = WorkerName::new("node-3", 3, 0);
     assert_eq!(record.workers, BTreeSet::from([name]));
-    rig.check(stored(1, RecordKey::Evaluation(1)), &["read job 1 evaluation 2"]);
+    rig.check(stored_event(1, RecordKey::Evaluation(1)), &["read job 1 evaluation 2"]);
     read(&mut rig, &store, 2);
     assert_eq!(rig.state.jobs[&JobId(1)].search.evaluations(), 3);
 }
@@ -229,7 +229,7 @@ fn the_evaluations_of_a_banned_worker_are_computed_again() {
 fn an_evaluation_that_changes_is_the_last_of_its_path() {
     let (mut rig, mut store) = rig(&[2], 3);
     expose(&mut rig, 2);
-    rig.event(stored(2, RecordKey::Ban(1)));
+    rig.event(stored_event(2, RecordKey::Ban(1)));
     assert_eq!(read(&mut rig, &store, 0), [""; 0]);
     rig.event(hello_of(60, 3, 1));
     let different = answer(60, batch_of(&rig, JobId(1)), 77, 1);
@@ -241,7 +241,7 @@ fn an_evaluation_that_changes_is_the_last_of_its_path() {
     store.put_evaluation(record, true).unwrap();
     assert_eq!(store.jobs().unwrap()[0].evaluations, 1);
     // The following evaluations are computed, not read.
-    let effects = rig.event(stored(1, RecordKey::Evaluation(0)));
+    let effects = rig.event(stored_event(1, RecordKey::Evaluation(0)));
     assert!(effects.iter().all(|effect| effect.starts_with("send")), "{effects:?}");
 }
 
@@ -261,7 +261,7 @@ fn a_ban_that_the_store_refuses_for_too_long_is_despaired_of_and_tried_on() {
     }
     rig.check(failed(), &["give_up after 4s: the disk is full"]);
     rig.check_after(Duration::from_secs(2), &[&banned]);
-    rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
+    rig.check(stored_event(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
 }
 
 /// Returns a rig with a search of one evaluation, answered by process 2, whose end the store has
@@ -272,7 +272,7 @@ fn refused_end() -> Rig {
     rig.accept(propagation(1));
     rig.event(hello_of(100, 2, 1));
     rig.check(answer(100, 1, 0, 1), &["store job 1 evaluation 0"]);
-    let end = rig.event(stored(1, RecordKey::Evaluation(0)));
+    let end = rig.event(stored_event(1, RecordKey::Evaluation(0)));
     assert_eq!(end, ["store job 1 end: converged "]);
     rig.event(end_of_stream(100));
     rig
@@ -288,7 +288,7 @@ fn an_end_that_the_store_refuses_is_taken_back_with_its_worker() {
     let mut rig = refused_end();
     rig.check(not_stored(1, RecordKey::End), &[]);
     expose(&mut rig, 2);
-    rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
+    rig.check(stored_event(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
     // No wrong end is written meanwhile.
     rig.check_after(Duration::from_secs(1), &[]);
 
@@ -302,12 +302,12 @@ fn an_end_that_the_store_refuses_is_taken_back_with_its_worker() {
         let effects = expose(&mut rig, 2);
         assert!(!effects.iter().any(|effect| effect.starts_with("read")), "{effects:?}");
         rig.check(not_stored(1, RecordKey::End), &[]);
-        rig.check(stored(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
+        rig.check(stored_event(2, RecordKey::Ban(1)), &["read job 1 evaluation 0"]);
     }
 
     // On its way, and durable: the log names it.
     let mut rig = refused_end();
     expose(&mut rig, 2);
-    rig.check(stored(1, RecordKey::End), &["publish 1"]);
-    rig.check(stored(2, RecordKey::Ban(1)), &[]);
+    rig.check(stored_event(1, RecordKey::End), &["publish 1"]);
+    rig.check(stored_event(2, RecordKey::Ban(1)), &[]);
 }

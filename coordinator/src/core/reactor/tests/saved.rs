@@ -43,7 +43,7 @@ fn stored_parts(rig: &mut Rig, store: &mut MemoryStore, event: Event) -> usize {
 }
 
 /// Returns what another coordinator makes of the store.
-fn restarted(rig: &Rig, store: &mut MemoryStore) -> Rig {
+fn restart(rig: &Rig, store: &mut MemoryStore) -> Rig {
     store.put_job(&rig.state.jobs[&JobId(1)].record).unwrap();
     let restored = Restored::load(store).unwrap();
     let config = Config { audit_fraction: 0.0, speculation: false, ..Config::default() };
@@ -52,7 +52,7 @@ fn restarted(rig: &Rig, store: &mut MemoryStore) -> Rig {
     Rig { state, now: rig.now }
 }
 
-fn filled(rig: &Rig) -> u64 {
+fn filled_realizations(rig: &Rig) -> u64 {
     rig.state.jobs[&JobId(1)].evaluation().unwrap().filled()
 }
 
@@ -93,8 +93,8 @@ fn a_restart_repeats_only_what_was_answered_last() {
     // What is saved is not saved again.
     rig.now += Duration::from_secs(2);
     assert_eq!(stored_parts(&mut rig, &mut store, Event::Tick), 0);
-    let mut after = restarted(&rig, &mut store);
-    assert_eq!(filled(&after), answered);
+    let mut after = restart(&rig, &mut store);
+    assert_eq!(filled_realizations(&after), answered);
     let first = format!("send 1: batch 1 = {answered}+");
     assert!(after.event(hello(1, 2))[1].starts_with(&first), "{first}");
 }
@@ -104,7 +104,7 @@ fn a_stop_saves_everything() {
     let (mut rig, answered) = rig();
     let mut store = MemoryStore::new();
     assert_eq!(stored_parts(&mut rig, &mut store, Event::Drain) as u64, answered);
-    assert_eq!(filled(&restarted(&rig, &mut store)), answered);
+    assert_eq!(filled_realizations(&restart(&rig, &mut store)), answered);
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn a_write_that_fails_is_repeated_with_the_next() {
     rig.check(Event::StoreFailed { job: JobId(1), key: RecordKey::Part, error }, &[]);
     rig.now += Duration::from_secs(2);
     assert_eq!(stored_parts(&mut rig, &mut store, Event::Tick) as u64, answered);
-    assert_eq!(filled(&restarted(&rig, &mut store)), answered);
+    assert_eq!(filled_realizations(&restart(&rig, &mut store)), answered);
 }
 
 #[test]
@@ -137,14 +137,14 @@ fn answers_of_a_banned_worker_are_not_used() {
         lifted: None,
     };
     // Banned after the restart.
-    let mut after = restarted(&rig, &mut store);
-    assert_eq!(filled(&after), answered);
+    let mut after = restart(&rig, &mut store);
+    assert_eq!(filled_realizations(&after), answered);
     bans::ban(&mut Turn::new(&mut after.state, rig.now), &worker, JobId(1), "lies".to_owned());
     sanity_check(&after.state).unwrap();
-    assert_eq!(filled(&after), 0);
+    assert_eq!(filled_realizations(&after), 0);
     // Banned before it.
     store.put_ban(&ban).unwrap();
-    assert_eq!(filled(&restarted(&rig, &mut store)), 0);
+    assert_eq!(filled_realizations(&restart(&rig, &mut store)), 0);
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn a_complete_evaluation_leaves_nothing_saved() {
     let mut store = MemoryStore::new();
     stored_parts(&mut rig, &mut store, Event::Drain);
     assert!(!store.parts(JobId(1)).unwrap().is_empty());
-    let mut after = restarted(&rig, &mut store);
+    let mut after = restart(&rig, &mut store);
     let mut sent: Vec<Effect> = react(&mut after.state, hello(1, 2), after.now);
     while let Some(effect) = sent.pop() {
         match effect {
@@ -227,6 +227,6 @@ fn full_pieces_of_a_large_evaluation_are_stored_before_it_is_complete() {
     assert_eq!(pieces(&mut rig), []);
     fill(&mut rig, 2 * piece, piece);
     assert_eq!(pieces(&mut rig), [(2 * piece, attempt)]);
-    let _ = react(&mut rig.state, stored(1, RecordKey::Piece(attempt)), rig.now);
+    let _ = react(&mut rig.state, stored_event(1, RecordKey::Piece(attempt)), rig.now);
     assert_eq!(being_stored(&rig), 0);
 }

@@ -17,7 +17,7 @@ fn rig(workers: u32) -> Rig {
 }
 
 fn evaluation(number: u64) -> Event {
-    stored(1, RecordKey::Evaluation(number))
+    stored_event(1, RecordKey::Evaluation(number))
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn other_work_takes_its_place() {
     let mut rig = rig(2);
     rig.event(submit(1, "", propagation(1)));
     let expected = ["answer 1: job 2", "revoke 2: batch 2", "send 2: batch 3 = 0+1"];
-    rig.check(stored(2, RecordKey::Job), &expected);
+    rig.check(stored_event(2, RecordKey::Job), &expected);
     // When that is done, speculation continues.
     rig.check(answer(2, 3, 0, 1), &["store job 2 evaluation 0", "send 2: batch 4 = 0+1"]);
 }
@@ -110,7 +110,7 @@ fn threads_that_a_batch_leaves_idle_are_used() {
     // The worker may hold no further batch beside the speculative one, which is revoked.
     rig.event(submit(1, "", propagation(1)));
     let expected = ["answer 1: job 2", "revoke 1: batch 2", "send 1: batch 3 = 0+1"];
-    rig.check(stored(2, RecordKey::Job), &expected);
+    rig.check(stored_event(2, RecordKey::Job), &expected);
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn memory_is_for_what_is_asked_for() {
     // Another job begins, and the limit on realizations in memory leaves no space for both.
     rig.event(submit(1, "", propagation(2)));
     let expected = ["answer 1: job 2", "revoke 1: batch 2", "send 1: batch 3 = 0+2"];
-    rig.check(stored(2, RecordKey::Job), &expected);
+    rig.check(stored_event(2, RecordKey::Job), &expected);
     assert!(rig.state.jobs[&JobId(1)].speculation.evaluations.is_empty());
 }
 

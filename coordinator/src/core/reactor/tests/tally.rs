@@ -1,4 +1,4 @@
-//! EventCounts and measurements of what happens, as they are exported for monitoring.
+//! Counts and measurements of what happens, as they are exported for monitoring.
 
 use osteon_common::outcome::FailureKind;
 
@@ -19,22 +19,22 @@ impl Counted {
 
     fn event(&mut self, event: Event) {
         let now = self.rig.now;
-        let before = self.tally.before(&self.rig.state, &event, now);
+        let before = self.tally.count_event(&self.rig.state, &event, now);
         let effects = react(&mut self.rig.state, event, now);
-        self.tally.after(&before, &self.rig.state, &effects, now);
+        self.tally.count_reaction(&before, &self.rig.state, &effects, now);
     }
 
     fn accept(&mut self, specification: JobSpecification) {
         let job = self.rig.state.next_job;
         self.event(submit(0, "", specification));
-        self.event(stored(job, RecordKey::Job));
+        self.event(stored_event(job, RecordKey::Job));
     }
 
     fn counts(&self) -> &EventCounts {
         self.tally.counts()
     }
 
-    fn measured(&self) -> StateMeasurements {
+    fn measure(&self) -> StateMeasurements {
         StateMeasurements::new(&self.rig.state, self.rig.now)
     }
 }
@@ -43,11 +43,11 @@ impl Counted {
 fn a_job_is_counted_from_its_acceptance_to_its_end() {
     let mut counted = Counted::new(Rig::new());
     counted.accept(propagation(2));
-    assert_eq!(counted.measured().realizations_waiting, 2);
+    assert_eq!(counted.measure().realizations_waiting, 2);
     counted.event(hello(1, 2));
-    assert_eq!((counted.measured().slots_busy, counted.measured().batches_in_flight), (2, 1));
+    assert_eq!((counted.measure().slots_busy, counted.measure().batches_in_flight), (2, 1));
     counted.rig.now += Duration::from_secs(2);
-    assert_eq!(counted.measured().oldest_batch, Duration::from_secs(2));
+    assert_eq!(counted.measure().oldest_batch, Duration::from_secs(2));
     let failed = RealizationResult::failed(FailureKind::NoArrival);
     let solved = RealizationResult::solved(velocity(0).unwrap(), 0.0);
     let answer = |worker| Event::Answered {
@@ -63,14 +63,14 @@ fn a_job_is_counted_from_its_acceptance_to_its_end() {
     // The same again is only compared.
     counted.event(answer(1));
     assert_eq!(counted.counts().realizations, [1, 1, 0, 0, 0, 0]);
-    counted.event(stored(1, RecordKey::Evaluation(0)));
-    counted.event(stored(1, RecordKey::End));
+    counted.event(stored_event(1, RecordKey::Evaluation(0)));
+    counted.event(stored_event(1, RecordKey::End));
     let counts = counted.counts();
     assert_eq!((counts.jobs_accepted, counts.evaluations), (1, 1));
     assert_eq!((counts.evaluation_times.count(), counts.evaluation_times.sum_s()), (1, 2.0));
     assert_eq!(counts.jobs_ended.iter().sum::<u64>(), 1);
     assert_eq!(counts.batches_sent, [1, 0, 0, 0, 0, 0]);
-    let measured = counted.measured();
+    let measured = counted.measure();
     let expected =
         StateMeasurements { jobs_ended: 1, slots_idle: 2, workers_ok: 1, ..measured.clone() };
     assert_eq!(measured, expected);
@@ -93,7 +93,7 @@ fn workers_are_counted_when_they_come_leave_and_are_lost() {
     assert_eq!((sent, counts.batches_reassigned), (2, 2));
     counted.event(hello_of(3, 3, 4));
     counted.event(Event::WorkerDrains { worker: WorkerId(3) });
-    let measured = counted.measured();
+    let measured = counted.measure();
     assert_eq!((measured.workers_draining, measured.workers_ok), (1, 0));
     assert_eq!((measured.slots_idle, measured.slots_unavailable), (0, 4 - measured.slots_busy));
 }
@@ -120,11 +120,11 @@ fn answers_that_differ_and_bans_are_counted() {
     }
     let mut counted = Counted::new(rig);
     counted.event(answer(1, 1, 0, 1));
-    counted.event(checks::wrong(2, 2, 0, checks::ONE_BIT));
+    counted.event(checks::wrong_answer(2, 2, 0, checks::ONE_BIT));
     assert_eq!((counted.counts().mismatches, counted.counts().bans), (1, 0));
     counted.event(answer(3, 3, 0, 1));
     assert_eq!((counted.counts().mismatches, counted.counts().bans), (1, 1));
-    assert_eq!(counted.measured().workers_banned, 1);
+    assert_eq!(counted.measure().workers_banned, 1);
     assert_eq!(counted.counts().batches_sent, [0, 0, 0, 1, 1, 0]);
 }
 
@@ -137,7 +137,7 @@ fn errors_of_the_store_are_counted_and_how_long_it_refuses() {
     counted.event(Event::StoreFailed { job: JobId(1), key, error });
     counted.rig.now += Duration::from_secs(3);
     assert_eq!(counted.counts().store_errors, 1);
-    assert_eq!(counted.measured().store_refusing, Duration::from_secs(3));
+    assert_eq!(counted.measure().store_refusing, Duration::from_secs(3));
 }
 
 /// Slots that one job wants: (realizations, s of one realization or `None` before the first answer,
