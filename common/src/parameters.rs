@@ -66,12 +66,12 @@ pub struct ParameterRow {
     /// The unit in which people read it, and what one of that is in the unit of files.
     pub shown_in: (&'static str, f64),
     /// Whether its intervals are those of its logarithm.
-    pub scale: Scale,
+    pub scale: ParameterScale,
 }
 
 /// The scale on which the error of a parameter is nearly normal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scale {
+pub enum ParameterScale {
     /// That of its values.
     Linear,
     /// That of their logarithms.
@@ -87,7 +87,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "kg/m³",
         accepted: Interval::above(0.0, "kg/m³"),
         shown_in: ("kg/m³", 1.0),
-        scale: Scale::Logarithmic,
+        scale: ParameterScale::Logarithmic,
     },
     ParameterRow {
         name: "longitudinal_young_modulus",
@@ -97,7 +97,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "Pa",
         accepted: Interval::above(0.0, "Pa"),
         shown_in: ("GPa", 1e9),
-        scale: Scale::Logarithmic,
+        scale: ParameterScale::Logarithmic,
     },
     ParameterRow {
         name: "longitudinal_poisson_ratio",
@@ -107,7 +107,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "",
         accepted: Interval::finite(""),
         shown_in: ("", 1.0),
-        scale: Scale::Linear,
+        scale: ParameterScale::Linear,
     },
     ParameterRow {
         name: "longitudinal_shear_modulus",
@@ -117,7 +117,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "Pa",
         accepted: Interval::above(0.0, "Pa"),
         shown_in: ("GPa", 1e9),
-        scale: Scale::Logarithmic,
+        scale: ParameterScale::Logarithmic,
     },
     ParameterRow {
         name: "transverse_young_modulus",
@@ -127,7 +127,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "Pa",
         accepted: Interval::above(0.0, "Pa"),
         shown_in: ("GPa", 1e9),
-        scale: Scale::Logarithmic,
+        scale: ParameterScale::Logarithmic,
     },
     ParameterRow {
         name: "transverse_poisson_ratio",
@@ -137,7 +137,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "",
         accepted: Interval::between(-1.0, 1.0, ""),
         shown_in: ("", 1.0),
-        scale: Scale::Linear,
+        scale: ParameterScale::Linear,
     },
     ParameterRow {
         name: "dispersion",
@@ -147,7 +147,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "",
         accepted: Interval::between(0.0, DISPERSION_MAX, "that is √(7/11)"),
         shown_in: ("", 1.0),
-        scale: Scale::Logarithmic,
+        scale: ParameterScale::Logarithmic,
     },
     ParameterRow {
         name: "bone_thickness",
@@ -157,7 +157,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "m",
         accepted: Interval::above(0.0, "m"),
         shown_in: ("mm", 1e-3),
-        scale: Scale::Logarithmic,
+        scale: ParameterScale::Logarithmic,
     },
     ParameterRow {
         name: "bone_quality_factor",
@@ -167,7 +167,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "",
         accepted: Interval::at_least(QUALITY_FACTOR_MIN, ""),
         shown_in: ("", 1.0),
-        scale: Scale::Logarithmic,
+        scale: ParameterScale::Logarithmic,
     },
     ParameterRow {
         name: "coupling_sound_speed",
@@ -177,7 +177,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         unit: "m/s",
         accepted: Interval::above(0.0, "m/s"),
         shown_in: ("m/s", 1.0),
-        scale: Scale::Logarithmic,
+        scale: ParameterScale::Logarithmic,
     },
 ];
 

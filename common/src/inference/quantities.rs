@@ -10,7 +10,7 @@ use crate::data_statistics::{FewIntervals, intervals_of_data};
 use crate::ensemble::DISPERSION_MAX;
 use crate::job::{Data, JobSpecification, Range};
 use crate::moments::{ConfidenceInterval, MOMENTS, MomentMatrix, MomentVector};
-use crate::parameters::{Parameter, Point, Scale};
+use crate::parameters::{Parameter, ParameterScale, Point};
 use crate::results::BestPoint;
 
 /// How far the logarithm of a mean velocity may be off the closed form, ln √(c1111/ρ), between two
@@ -87,7 +87,9 @@ impl Quantities<'_> {
             let value = self.best.point.get(parameter);
             let quantity = match parameter {
                 Parameter::Dispersion => self.dispersion(free),
-                _ if parameter.row().scale == Scale::Linear => self.poisson_ratio(parameter, free),
+                _ if parameter.row().scale == ParameterScale::Linear => {
+                    self.poisson_ratio(parameter, free)
+                }
                 _ if self.may_have_second_value(parameter) => {
                     DerivedQuantity { value, known: None }
                 }

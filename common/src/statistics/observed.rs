@@ -14,7 +14,7 @@ use super::sum::Sum;
 
 /// Number, mean and standard deviation of a set of values.
 #[derive(Clone, Copy)]
-struct Scatter {
+struct ValueScatter {
     count: f64,
     mean: f64,
     deviation: f64,
@@ -55,7 +55,7 @@ fn estimate(
             blocks::standard_error(influences, doubling, monte_carlo, found.count).mean
         }
     };
-    let Scatter { mean, deviation: standard_deviation, .. } = found;
+    let ValueScatter { mean, deviation: standard_deviation, .. } = found;
     Some(ObservableEstimate { mean, standard_deviation, standard_error })
 }
 
@@ -73,7 +73,8 @@ impl Data {
 pub fn measured_observables(set: &VelocitySet<'_>) -> ObservableEstimates {
     set.observables.map(|values| {
         let values = values?;
-        let Scatter { mean, deviation: standard_deviation, .. } = scatter(values.iter().copied())?;
+        let ValueScatter { mean, deviation: standard_deviation, .. } =
+            scatter(values.iter().copied())?;
         let variance = covariance_of_means(set, values.iter().map(|value| [value - mean]));
         let standard_error = variance.map_or(f64::NAN, |[[variance]]| variance.sqrt());
         Some(ObservableEstimate { mean, standard_deviation, standard_error })
@@ -115,11 +116,11 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     (count > 0).then(|| (count as f64, sum.total() / count as f64))
 }
 
-fn scatter(values: impl Iterator<Item = f64> + Clone) -> Option<Scatter> {
+fn scatter(values: impl Iterator<Item = f64> + Clone) -> Option<ValueScatter> {
     let (count, mean) = mean(values.clone())?;
     let mut squares = Sum::default();
     values.for_each(|value| squares.add((value - mean) * (value - mean)));
-    Some(Scatter { count, mean, deviation: (squares.total() / count).sqrt() })
+    Some(ValueScatter { count, mean, deviation: (squares.total() / count).sqrt() })
 }
 
 #[cfg(test)]

@@ -15,6 +15,8 @@ pub(crate) const GROUP_RECORDS_MAX: usize = 256;
 const GROUP_BYTES_MAX: usize = 4 << 20;
 /// Size up to which a group is small, bytes.
 const SMALL_BYTES_MAX: usize = 64 << 10;
+/// Approximate size of a saved result in the file, with observables, bytes.
+const RESULT_BYTES: usize = 32;
 /// Approximate size of a record without its lists, bytes.
 const RECORD_BYTES: usize = 1 << 10;
 
@@ -139,9 +141,11 @@ fn bytes(record: &Record) -> usize {
             Record::Evaluations(records) => {
                 records.iter().map(|it| RECORD_BYTES + size_of_val(&*it.outcomes)).sum()
             }
-            Record::Part(record) => {
-                record.pieces.iter().map(|piece| RECORD_BYTES + size_of_val(&*piece.results)).sum()
-            }
+            Record::Part(record) => record
+                .pieces
+                .iter()
+                .map(|piece| RECORD_BYTES + RESULT_BYTES * piece.results.len())
+                .sum(),
             Record::Piece { record, .. } => size_of_val(&*record.outcomes),
             Record::End { summary, .. } => {
                 size_of_val(&*summary.history) + size_of_val(&*summary.groups)

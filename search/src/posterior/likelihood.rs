@@ -16,13 +16,14 @@ use osteon_common::observables::ObservableSet;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SetLikelihood {
     pub(super) velocities: DataLikelihood,
-    observables: Option<Observed>,
+    observables: Option<MeasuredMeans>,
     /// The data's moments, to which the model's are relative.
     pub(super) data: ComparedMoments,
 }
 
+/// What is known of the means of the observables.
 #[derive(Debug, Clone, PartialEq)]
-struct Observed {
+struct MeasuredMeans {
     weights: MomentWeights,
     /// The data's moments in the coordinates of the model's.
     data: MomentVector,
@@ -37,7 +38,7 @@ impl SetLikelihood {
         let compared = data.compared(set);
         let observables = match data.observables().is_empty() {
             true => None,
-            false => Some(Observed {
+            false => Some(MeasuredMeans {
                 weights: MomentWeights::of_data(data, set)?,
                 data: compared.in_logarithms(&compared),
                 parts: data.set(set)?.parts() as f64,
@@ -52,7 +53,7 @@ impl SetLikelihood {
     #[must_use]
     pub(super) fn with_model_errors(self, errors: MomentVector) -> Self {
         let [mean, variation, ..] = errors;
-        let observables = self.observables.map(|observed| Observed {
+        let observables = self.observables.map(|observed| MeasuredMeans {
             weights: observed.weights.with_errors_of_observables(&errors),
             ..observed
         });

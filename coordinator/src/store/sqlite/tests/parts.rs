@@ -106,17 +106,6 @@ fn what_is_damaged_or_of_other_numerics_is_left_out() {
 }
 
 #[test]
-fn a_file_of_a_version_without_parts_is_opened() {
-    let (directory, store) = store();
-    store.connection.execute_batch("DROP TABLE part").unwrap();
-    drop(store);
-    let mut store = SqliteStore::open(directory.path()).unwrap();
-    assert_eq!(store.parts(JobId(1)).unwrap(), []);
-    store.put_part(&part(1, 0)).unwrap();
-    assert_eq!(store.parts(JobId(1)).unwrap(), [part(1, 0)]);
-}
-
-#[test]
 fn stale_parts_are_deleted_when_there_is_time() {
     let (directory, mut store) = store();
     let rows = |store: &SqliteStore| -> Vec<u64> {
