@@ -159,7 +159,7 @@ mod tests {
             seed in 0..=SEED_MAX,
             points in proptest::option::of(1..=REALIZATIONS_MAX),
             deviation in proptest::option::of(1e-6..1e-4),
-            observables in any::<[bool; 3]>(),
+            observables in any::<[bool; osteon_common::observables::OBSERVABLES]>(),
         ) {
             let mut evaluation = EVALUATION(id, density, seed);
             evaluation.observables = osteon_common::observables::PerObservable(observables);

@@ -183,7 +183,14 @@ mod tests {
 
     #[test]
     fn rotations_find_the_eigenvectors() {
-        let padded = |[a, b, c]: [f64; 3]| [a, b, 0.0, c, 0.0];
+        let padded = |[a, b, c]: [f64; 3]| {
+            array::from_fn(|i| match i {
+                0 => a,
+                1 => b,
+                3 => c,
+                _ => 0.0,
+            })
+        };
         let columns = [[1.0, -2.0, 0.5], [0.3, 0.9, -4.0], [2.0, 0.1, 0.7], [-1.0, 0.4, 0.2]];
         let columns = columns.map(padded);
         let eigen = eigen_of_rows(&columns);
@@ -199,6 +206,6 @@ mod tests {
             }
         }
         // Those of rows that are 0 are 0.
-        assert_eq!(eigen.map(|(square, _)| square > 0.0), [true, true, true, false, false]);
+        assert_eq!(eigen.map(|(square, _)| square > 0.0), array::from_fn(|k| k < 3));
     }
 }

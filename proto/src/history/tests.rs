@@ -1,6 +1,6 @@
 //! Tests of the conversion of the history to and from messages.
 
-use osteon_common::observables::PerObservable;
+use osteon_common::observables::{OBSERVABLES, PerObservable};
 use osteon_common::parameters::{AS_IN_SETUP, BONE_PARAMETERS, Parameter, Point};
 use osteon_common::results::Status;
 use osteon_fuzz::properties;
@@ -62,7 +62,7 @@ properties! {
         cost in cost(),
         failures in failures(),
         estimated_error in estimated_error(),
-        has in any::<[bool; 3]>(),
+        has in any::<[bool; OBSERVABLES]>(),
         observed in number(),
     ) {
         let varied = varied.map(|k| Parameter::ALL[k]);

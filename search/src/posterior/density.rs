@@ -2,7 +2,7 @@
 //! themselves.
 
 use osteon_common::job::JobSpecification;
-use osteon_common::moments::{ComparedMoments, MomentVector};
+use osteon_common::moments::{ComparedMoments, MOMENTS, MomentVector};
 use osteon_common::parameters::Point;
 
 use super::likelihood::SetLikelihood;
@@ -27,7 +27,8 @@ impl PosteriorDensity {
     /// standard errors, which common germs make nearly the same at every point.
     #[must_use]
     pub fn with_model_errors(self, [mean, variation]: [f64; 2]) -> Self {
-        let errors: MomentVector = [mean, variation, 0.0, 0.0, 0.0];
+        let mut errors: MomentVector = [0.0; MOMENTS];
+        (errors[0], errors[1]) = (mean, variation);
         Self { likelihood: self.likelihood.with_model_errors(errors), ..self }
     }
 

@@ -18,7 +18,11 @@ pub(super) type Deviations = MomentVector;
 
 /// Deviations by the rule of thumb, for use before any evaluation: v = 0.99 √(c1111/ρ),
 /// Δ = 0.99 δ/√14.
-pub(super) const RULE_OF_THUMB: Deviations = [-0.010_05, -1.329_58, 0.0, 0.0, 0.0];
+pub(super) const RULE_OF_THUMB: Deviations = {
+    let mut deviations = [0.0; MOMENTS];
+    (deviations[0], deviations[1]) = (-0.010_05, -1.329_58);
+    deviations
+};
 
 /// Variance of constant and trend in units of the process's own: practically unknown beforehand.
 const TREND_VARIANCE: f64 = 100.0;
@@ -257,7 +261,7 @@ impl Process {
 #[cfg(test)]
 mod tests {
     use osteon_common::ensemble::Germs;
-    use osteon_common::observables::PerObservable;
+    use osteon_common::observables::{Observable, PerObservable};
 
     use super::*;
 
@@ -265,19 +269,26 @@ mod tests {
         (0..count).map(|i| std::array::from_fn(|k| Germs::draw(seed, i).values()[k])).collect()
     }
 
-    const WITH_DECAY: ObservableSet = PerObservable([false, true, false]);
+    const DECAY: usize = 2 + Observable::Decay as usize;
+
+    fn with_decay() -> ObservableSet {
+        PerObservable::new(|one| one == Observable::Decay)
+    }
 
     /// A smooth function of two features.
     fn deviations(x: &Features) -> Deviations {
         let variation = -1.33 + 0.02 * x[1] * x[1] + 0.1 * x[0];
         let decay = 0.02 * libm::sin(x[0] + x[1]);
-        [0.01 * libm::sin(2.0 * x[0]) * (1.0 + x[1]), variation, 0.0, decay, 0.0]
+        let mut deviations = [0.0; MOMENTS];
+        deviations[0] = 0.01 * libm::sin(2.0 * x[0]) * (1.0 + x[1]);
+        (deviations[1], deviations[DECAY]) = (variation, decay);
+        deviations
     }
 
     #[test]
     fn smooth_functions_are_interpolated() {
         let inputs = sample(80, 3);
-        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs), WITH_DECAY);
+        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs), with_decay());
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);
         for x in sample(50, 4) {
@@ -291,7 +302,7 @@ mod tests {
     #[test]
     fn expected_errors_are_those_found() {
         let inputs = sample(60, 3);
-        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs), WITH_DECAY);
+        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs), with_decay());
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);
         let mut sums = [[0.0; 2]; MOMENTS];
@@ -302,7 +313,7 @@ mod tests {
                 sums[k][1] += variance;
             }
         }
-        for [found, expected] in [sums[0], sums[1], sums[3]] {
+        for [found, expected] in [sums[0], sums[1], sums[DECAY]] {
             let ratio = (found / expected).sqrt();
             assert!((0.33..3.0).contains(&ratio), "{ratio}");
         }
@@ -313,7 +324,7 @@ mod tests {
     #[test]
     fn points_are_interpolated() {
         let inputs = sample(30, 5);
-        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs), WITH_DECAY);
+        let mut surrogate = Surrogate::new(Scale::from_sample(&inputs), with_decay());
         assert_eq!(surrogate.mean(&inputs[0]), RULE_OF_THUMB);
         inputs.iter().for_each(|x| surrogate.add(x, deviations(x)));
         surrogate.fit(true);

@@ -15,6 +15,10 @@ fn residual(rows: &Rows, right: MomentVector, at: &[f64]) -> MomentVector {
     array::from_fn(|i| dot(&rows[i], at) - right[i])
 }
 
+fn right([first, second]: [f64; 2]) -> MomentVector {
+    array::from_fn(|i| [first, second].get(i).copied().unwrap_or(0.0))
+}
+
 /// Returns these rows and as many rows of zeros as there are missing.
 fn padded<const N: usize>(rows: [Vec<f64>; N]) -> Rows {
     let length = rows[0].len();
@@ -76,7 +80,7 @@ properties! {
 #[test]
 fn a_start_that_solves_stays() {
     let rows = padded([vec![0.5, 0.25, 0.0], vec![0.0, 0.0, 1.0]]);
-    let at = nearest(&[0.5, 0.5, 0.25], &rows, [0.375, 0.25, 0.0, 0.0, 0.0]);
+    let at = nearest(&[0.5, 0.5, 0.25], &rows, right([0.375, 0.25]));
     assert_eq!(at, [0.5, 0.5, 0.25]);
 }
 
@@ -85,7 +89,7 @@ fn what_one_coordinate_cannot_the_others_do() {
     // The step from (0.9, 0.5) by (0.3, 0.3) leaves the box: the first coordinate stops, the second
     // continues.
     let rows = padded([vec![1.0, 1.0]]);
-    let at = nearest(&[0.9, 0.2], &rows, [1.7, 0.0, 0.0, 0.0, 0.0]);
+    let at = nearest(&[0.9, 0.2], &rows, right([1.7, 0.0]));
     assert!((at[0] - 1.0).abs() < 1e-9 && (at[1] - 0.7).abs() < 1e-9, "{at:?}");
 }
 
