@@ -204,8 +204,13 @@ impl Parameter {
 
     /// The others, quantities of the setup that a job may search.
     pub const OF_SETUP: [Self; PARAMETERS - BONE_PARAMETERS] = {
-        let [.., thickness, quality, speed] = Self::ALL;
-        [thickness, quality, speed]
+        let mut of_setup = [Self::BoneThickness; PARAMETERS - BONE_PARAMETERS];
+        let mut place = 0;
+        while place < of_setup.len() {
+            of_setup[place] = Self::ALL[BONE_PARAMETERS + place];
+            place += 1;
+        }
+        of_setup
     };
 
     /// Returns the row of the table.
@@ -231,8 +236,13 @@ pub struct Point(pub [f64; PARAMETERS]);
 
 /// Extends values of [`Parameter::OF_BONE`] to all parameters, by the same value for all others.
 pub const fn extended<T: Copy>(of_bone: [T; BONE_PARAMETERS], others: T) -> [T; PARAMETERS] {
-    let [density, e_l, nu_l, g_l, e_t, nu_t, dispersion] = of_bone;
-    [density, e_l, nu_l, g_l, e_t, nu_t, dispersion, others, others, others]
+    let mut all = [others; PARAMETERS];
+    let mut place = 0;
+    while place < BONE_PARAMETERS {
+        all[place] = of_bone[place];
+        place += 1;
+    }
+    all
 }
 
 /// The numbers of the parameters that the point has.

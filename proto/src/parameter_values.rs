@@ -7,30 +7,11 @@ use crate::v1;
 
 /// Returns the message of a point.
 pub fn point_to_message(point: &Point) -> v1::ParameterValues {
-    let [
-        density,
-        longitudinal_young_modulus,
-        longitudinal_poisson_ratio,
-        longitudinal_shear_modulus,
-        transverse_young_modulus,
-        transverse_poisson_ratio,
-        dispersion,
-        of_setup @ ..,
-    ] = point.0.map(Some);
-    let searched = |value: Option<f64>| value.filter(|value| *value != AS_IN_SETUP);
-    let [bone_thickness, bone_quality_factor, coupling_sound_speed] = of_setup.map(searched);
-    v1::ParameterValues {
-        density,
-        longitudinal_young_modulus,
-        longitudinal_poisson_ratio,
-        longitudinal_shear_modulus,
-        transverse_young_modulus,
-        transverse_poisson_ratio,
-        dispersion,
-        bone_thickness,
-        bone_quality_factor,
-        coupling_sound_speed,
+    let mut message = v1::ParameterValues::default();
+    for (parameter, value) in point.given() {
+        *slot(&mut message, parameter) = Some(value);
     }
+    message
 }
 
 /// Returns the point of a message.

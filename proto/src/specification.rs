@@ -214,36 +214,27 @@ fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measu
 }
 
 fn parameters_to_message(ranges: &[Range; PARAMETERS]) -> v1::Parameters {
-    let message = |parameter: Parameter| {
-        let range = match ranges[parameter as usize] {
-            Range::AS_IN_SETUP if parameter.of_setup().is_some() => return None,
+    let mut message = v1::Parameters::default();
+    for (parameter, range) in Parameter::ALL.into_iter().zip(ranges) {
+        let range = match *range {
+            Range::AS_IN_SETUP if parameter.of_setup().is_some() => continue,
             Range::Fixed(value) => v1::parameter_range::Range::Fixed(value),
             Range::Free { start, lower, upper } => {
                 v1::parameter_range::Range::Free(v1::FreeRange { start, lower, upper })
             }
         };
-        Some(v1::ParameterRange { range: Some(range) })
-    };
-    v1::Parameters {
-        density: message(Parameter::Density),
-        longitudinal_young_modulus: message(Parameter::LongitudinalYoungModulus),
-        longitudinal_poisson_ratio: message(Parameter::LongitudinalPoissonRatio),
-        longitudinal_shear_modulus: message(Parameter::LongitudinalShearModulus),
-        transverse_young_modulus: message(Parameter::TransverseYoungModulus),
-        transverse_poisson_ratio: message(Parameter::TransversePoissonRatio),
-        dispersion: message(Parameter::Dispersion),
-        bone_thickness: message(Parameter::BoneThickness),
-        bone_quality_factor: message(Parameter::BoneQualityFactor),
-        coupling_sound_speed: message(Parameter::CouplingSoundSpeed),
+        *range_slot(&mut message, parameter) = Some(v1::ParameterRange { range: Some(range) });
     }
+    message
 }
 
 fn parameters_from_message(
     message: Option<&v1::Parameters>,
     violations: &mut Violations,
 ) -> [Range; PARAMETERS] {
+    let mut message = message.cloned().unwrap_or_default();
     Parameter::ALL.map(|parameter| {
-        let range = message.and_then(|message| parameter_message(message, parameter));
+        let range = range_slot(&mut message, parameter).as_ref();
         match range.and_then(|range| range.range.as_ref()) {
             Some(v1::parameter_range::Range::Fixed(value)) => Range::Fixed(*value),
             Some(v1::parameter_range::Range::Free(free)) => {
@@ -261,21 +252,21 @@ fn parameters_from_message(
     })
 }
 
-fn parameter_message(
-    message: &v1::Parameters,
+fn range_slot(
+    message: &mut v1::Parameters,
     parameter: Parameter,
-) -> Option<&v1::ParameterRange> {
+) -> &mut Option<v1::ParameterRange> {
     match parameter {
-        Parameter::Density => message.density.as_ref(),
-        Parameter::LongitudinalYoungModulus => message.longitudinal_young_modulus.as_ref(),
-        Parameter::LongitudinalPoissonRatio => message.longitudinal_poisson_ratio.as_ref(),
-        Parameter::LongitudinalShearModulus => message.longitudinal_shear_modulus.as_ref(),
-        Parameter::TransverseYoungModulus => message.transverse_young_modulus.as_ref(),
-        Parameter::TransversePoissonRatio => message.transverse_poisson_ratio.as_ref(),
-        Parameter::Dispersion => message.dispersion.as_ref(),
-        Parameter::BoneThickness => message.bone_thickness.as_ref(),
-        Parameter::BoneQualityFactor => message.bone_quality_factor.as_ref(),
-        Parameter::CouplingSoundSpeed => message.coupling_sound_speed.as_ref(),
+        Parameter::Density => &mut message.density,
+        Parameter::LongitudinalYoungModulus => &mut message.longitudinal_young_modulus,
+        Parameter::LongitudinalPoissonRatio => &mut message.longitudinal_poisson_ratio,
+        Parameter::LongitudinalShearModulus => &mut message.longitudinal_shear_modulus,
+        Parameter::TransverseYoungModulus => &mut message.transverse_young_modulus,
+        Parameter::TransversePoissonRatio => &mut message.transverse_poisson_ratio,
+        Parameter::Dispersion => &mut message.dispersion,
+        Parameter::BoneThickness => &mut message.bone_thickness,
+        Parameter::BoneQualityFactor => &mut message.bone_quality_factor,
+        Parameter::CouplingSoundSpeed => &mut message.coupling_sound_speed,
     }
 }
 

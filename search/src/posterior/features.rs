@@ -7,7 +7,7 @@
 //! velocities) at a twentieth of the test points in these, and by more than 0.7 in the ratios.
 
 use osteon_common::bulk_velocity::bulk_velocity;
-use osteon_common::parameters::{AS_IN_SETUP, PARAMETERS, Point};
+use osteon_common::parameters::{AS_IN_SETUP, BONE_PARAMETERS, PARAMETERS, Point};
 
 /// Number of features.
 pub(super) const FEATURES: usize = PARAMETERS;
@@ -30,20 +30,29 @@ pub(super) fn features(point: &Point) -> Option<Features> {
     let c13 = e_t * nu_l / margin;
     let c23 = e_t * (nu_t + ratio) / ((1.0 + nu_t) * margin);
     (dispersion > 0.0 && g_l > 0.0).then(|| {
-        let [thickness, quality, speed] = of_setup;
-        [
-            c33 / c11,
-            c13 / c11,
-            g_l / c11,
-            libm::log(density),
-            c23 / c33,
-            2.0 * velocity.logarithm,
-            libm::log(dispersion),
-            thickness,
-            quality,
-            speed,
-        ]
+        extended_by(
+            [
+                c33 / c11,
+                c13 / c11,
+                g_l / c11,
+                libm::log(density),
+                c23 / c33,
+                2.0 * velocity.logarithm,
+                libm::log(dispersion),
+            ],
+            of_setup,
+        )
     })
+}
+
+fn extended_by(
+    of_bone: [f64; BONE_PARAMETERS],
+    of_setup: [f64; PARAMETERS - BONE_PARAMETERS],
+) -> Features {
+    let mut features = [0.0; FEATURES];
+    features[..BONE_PARAMETERS].copy_from_slice(&of_bone);
+    features[BONE_PARAMETERS..].copy_from_slice(&of_setup);
+    features
 }
 
 #[cfg(test)]
