@@ -431,7 +431,7 @@ fn too_few_open_files_are_named_at_once() {
         let (found, told) = told.split_once(" open files and needs ").unwrap();
         assert_eq!(found, most.to_string());
         needed = told.split_once(": raise the limit with `ulimit -n ").unwrap().0.parse().ok();
-        assert!(!refused.stderr.contains("starting another"), "{most}: {refused:?}");
+        assert!(!refused.stderr.contains("trying again"), "{most}: {refused:?}");
         assert!(!out.exists(), "{most}");
     }
     limited(needed.unwrap()).succeeded();

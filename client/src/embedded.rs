@@ -23,7 +23,7 @@ use crate::run_error::RunError;
 pub use crate::embedded::workers::BAD_MACHINE;
 
 /// Longest path of a temporary directory that leaves room for the socket's name, bytes.
-const TEMPORARY_BYTES_MAX: usize = 70;
+const TEMPORARY_PATH_BYTES_MAX: usize = 70;
 /// A run ends if its store has accepted no write for this long, s; the same command resumes it.
 const STORE_PATIENCE_S: u64 = 10;
 
@@ -103,7 +103,7 @@ impl Embedded {
         }
     }
 
-    /// Ends and reaps the workers, then ends the coordinator.
+    /// Drains the coordinator, ends and reaps the workers, then shuts the coordinator down.
     pub async fn end(mut self) {
         // The coordinator first: it would report workers that are ended with batches as lost.
         self.workers.mute();
@@ -156,7 +156,7 @@ fn private_directory() -> anyhow::Result<TempDir> {
     builder.prefix("osteon-").permissions(std::fs::Permissions::from_mode(0o700));
     let parent = std::env::temp_dir();
     // The kernel accepts only short paths of sockets.
-    let parent = if parent.as_os_str().len() <= TEMPORARY_BYTES_MAX {
+    let parent = if parent.as_os_str().len() <= TEMPORARY_PATH_BYTES_MAX {
         parent
     } else {
         PathBuf::from("/tmp")

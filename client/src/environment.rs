@@ -1,4 +1,5 @@
-//! The environment variables that replace options about the coordinator.
+//! The environment variables that replace options: where the coordinator is, the files for it, and the name of
+//! a worker's machine.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -20,7 +21,7 @@ const HOST: &str = "OSTEON_HOST";
 /// The variables that name credential files.
 pub const FILES: [&str; 4] = [TLS_CA, TLS_CERT, TLS_KEY, TOKEN_FILE];
 
-/// Reason why the variables name no coordinator that can be used.
+/// Reason why the variables cannot be used.
 #[derive(Debug, Error)]
 pub enum EnvironmentError {
     /// A value is not text.

@@ -63,7 +63,7 @@ fn filled(complete: &str, partial: &str) -> ResultFile {
     ResultFile::from_json(&value.to_string()).unwrap()
 }
 
-/// Sets keys of an object and of nested objects. Failures are counted again.
+/// Sets keys of an object and of nested objects; `failures` is replaced as a whole.
 pub(crate) fn put(into: &mut Value, partial: &Value) {
     let (Some(entries), Value::Object(new)) = (into.as_object_mut(), partial) else {
         *into = partial.clone();

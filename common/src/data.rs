@@ -13,8 +13,8 @@ use crate::observables::{ObservableSet, ObservedColumns, PerObservable};
 pub struct Data {
     /// The measurements.
     pub measurements: Measurements,
-    /// Standard deviation of repeated measurements of the same place, m/s, at least 0. It is a part
-    /// of the data's variance, and not of the model's.
+    /// Standard deviation of repeated measurements of the same place, m/s, at least 0. Its square is
+    /// a part of the data's variance, and not of the model's; 0 if it is not known.
     pub repeatability: f64,
 }
 
@@ -48,17 +48,18 @@ pub enum Measurements {
 /// The measured velocities of one group: a bone, a patient, a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// Unique name; not empty, no control characters.
+    /// Unique name, not empty, without hidden characters.
     pub name: String,
     /// Velocities, m/s, each finite and above 0, at least one.
     pub velocities: Vec<f64>,
     /// Subject of each velocity, from 0, numbered by [`numbered`]: velocities of one subject are
     /// not independent. `None` if all velocities are independent.
     pub subjects: Option<Vec<u32>>,
-    /// Values of other observables that were measured with each velocity; the same observables of all
-    /// groups of a job.
+    /// Values of other observables that were measured with each velocity; in every group of a job the
+    /// same observables.
     pub observables: ObservedColumns,
-    /// Quantities of the setup that are known of this group; the same ones of all groups of a job.
+    /// Quantities of the setup that are known of this group: in every group of a job the same ones, each with
+    /// the group's own value.
     pub known: KnownQuantities,
 }
 

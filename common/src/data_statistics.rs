@@ -21,8 +21,8 @@ pub use self::lattice::rounding;
 pub const CONFIDENCE: f64 = 0.95;
 
 impl DataSummary {
-    /// Summarizes set number `set` of the data. Resamples velocities, which takes up to a fraction
-    /// of a second.
+    /// Summarizes set number `set` of the data. Resamples the subjects, if there are any,
+    /// which takes up to a fraction of a second.
     pub fn from_data(data: &Data, set: usize) -> Self {
         let given = data.set(set);
         let outliers = given.map(|given| outliers(given.velocities)).unwrap_or_default();

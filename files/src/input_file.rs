@@ -1,4 +1,4 @@
-//! A job or case file before its content is read: its text, and the settings of a command line.
+//! A job or case file before it is parsed: its text, and the settings of a command line.
 
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};

@@ -17,14 +17,14 @@ use crate::stalled::ReadPeer;
 /// Maximum size of the header of a request, bytes.
 const HEADER_BYTES_MAX: usize = 16 * 1024;
 /// Pause after the operating system failed to accept a connection.
-const REFUSED_WAIT: Duration = Duration::from_millis(100);
+const ACCEPT_FAILED_PAUSE: Duration = Duration::from_millis(100);
 
 /// Bounds on one connection.
 #[derive(Debug, Clone, Copy)]
 pub struct ConnectionBounds {
     /// Time limit for the header of a request, which also ends idle connections.
     pub header: Duration,
-    /// Time limit for the whole connection; `None` if it lasts as long as its client asks and reads.
+    /// Time limit for the whole connection; `None` if it lasts as long as its client sends requests and reads the answers.
     pub whole: Option<Duration>,
     /// Whether its client may send further requests after the first.
     pub keep_alive: bool,
@@ -64,7 +64,7 @@ pub async fn accept(listener: &TcpListener) -> TcpStream {
                 return stream;
             }
             // Too many files are open, say.
-            Err(_) => sleep(REFUSED_WAIT).await,
+            Err(_) => sleep(ACCEPT_FAILED_PAUSE).await,
         }
     }
 }

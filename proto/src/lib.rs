@@ -1,9 +1,9 @@
-//! Protocol buffers of `osteon.v1`, and the one place where messages are converted to and from
-//! `osteon-common` types.
+//! Protocol buffers of `osteon.v1`, the one place where messages are converted to and from
+//! `osteon-common` types; endpoints, credentials and connections.
 //!
-//! Messages from a peer are never trusted. A client's message is checked field by field and every
-//! [`osteon_common::violations::Violations`] is reported at once. A message from a coordinator or a
-//! worker is either well formed or a typed [`malformed::Malformed`].
+//! Messages from a peer are never trusted. A client's message is checked field by field, and all its
+//! [violations](osteon_common::violations::Violations) are reported at once. A message from a coordinator or
+//! a worker is well formed, or refused with a typed [`malformed::Malformed`].
 
 #![forbid(unsafe_code)]
 

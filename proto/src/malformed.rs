@@ -47,7 +47,7 @@ pub enum Malformed {
              outcome"
     )]
     Outcome {
-        /// Index within the block.
+        /// Position among the realizations of the message, from 0.
         index: usize,
         /// Code byte.
         code: u8,
@@ -60,7 +60,7 @@ pub enum Malformed {
          0 on failure"
     )]
     EstimatedError {
-        /// Index within the block.
+        /// Position among the realizations of the message, from 0.
         index: usize,
         /// The number found.
         value: f64,
@@ -71,7 +71,7 @@ pub enum Malformed {
         .observable.row().title
     )]
     ObservedValue {
-        /// Index within the block.
+        /// Position among the realizations of the message, from 0.
         index: usize,
         /// The observable.
         observable: Observable,
@@ -111,7 +111,7 @@ pub enum Malformed {
         /// Why it is not.
         reason: String,
     },
-    /// A stored specification violates a rule.
+    /// The specification of a fetched job violates a rule.
     #[error("the specification is not valid: {0}")]
     InvalidSpecification(Violations),
 }

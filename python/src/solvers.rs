@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::errors;
 
-/// Maximum number of solvers kept, each with up to 48 MB of tables.
+/// Maximum number of solvers kept, each with up to 160 MB of tables.
 const SOLVERS_MAX: usize = 2;
 
 /// The solvers, the most recently used first, and the process that made them.

@@ -22,7 +22,7 @@ pub(crate) struct JobFileArguments {
 }
 
 impl JobFileArguments {
-    /// Reads the file, without looking at its content.
+    /// Reads the text of the file, without parsing it.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -45,7 +45,7 @@ pub(crate) struct CaseFileArguments {
 }
 
 impl CaseFileArguments {
-    /// Reads the file, without looking at its content.
+    /// Reads the text of the file, without parsing it.
     ///
     /// # Errors
     /// If it cannot be read.

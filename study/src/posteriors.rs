@@ -15,7 +15,7 @@ use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorSettings, Range, Sampling,
     Search, SearchMethod,
 };
-use osteon_common::parameters::{Parameter, Point};
+use osteon_common::parameters::{BONE_PARAMETERS, Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorSummary};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::statistics::PointStatistics;
@@ -43,7 +43,7 @@ const FAILED_MAX: f64 = 0.1;
 /// Number of velocities from which on there are many.
 const MANY: u64 = 500;
 /// Quantities of a posterior: the seven parameters and √(c1111/ρ).
-const QUANTITIES: usize = 8;
+const QUANTITIES: usize = BONE_PARAMETERS + 1;
 
 /// Counts of one quantity over data sets.
 #[derive(Debug, Clone, Copy, Default)]
@@ -57,16 +57,16 @@ struct Calibration {
 #[derive(Debug, Default)]
 struct Tally {
     posteriors: u64,
-    unusable: u64,
     unconverged: u64,
     evaluations: u64,
     quantities: [Calibration; QUANTITIES],
 }
 
-/// One parameter set.
+/// What became of one parameter set.
 enum TruthOutcome {
-    /// Too many of its realizations fail.
+    /// Too many of its realizations fail, or it has no posterior.
     Unusable,
+    /// Its posterior, and the parameters that made the data.
     Posterior(Box<Posterior>, Point),
 }
 
@@ -78,7 +78,7 @@ enum TruthOutcome {
 /// Posteriors that did not converge are counted like the others.
 ///
 /// # Errors
-/// If a point has no ensemble.
+/// If a point has no ensemble, or an identification fails.
 pub fn table(
     study: &PosteriorCalibration,
     progress: RowCallback<'_>,
@@ -88,14 +88,14 @@ pub fn table(
     let (sender, drawn) = mpsc::channel();
     std::thread::scope(|scope| {
         scope.spawn(move || {
-            // In any order: the counts do not depend on it. The receiver lives longer.
+            // In any order: the counts do not depend on it. After an error nobody receives the rest.
             numbers.into_par_iter().for_each_with(sender, |sender, number| {
                 drop(sender.send((number, compute_outcome(study, number))));
             });
         });
         for (number, drawn) in drawn {
             match drawn? {
-                TruthOutcome::Unusable => tally.unusable += 1,
+                TruthOutcome::Unusable => {}
                 TruthOutcome::Posterior(posterior, truth) => {
                     tally.add(&posterior, &truth);
                     progress(&tally.line(number, &posterior, &truth));
@@ -190,14 +190,15 @@ fn compute_outcome(study: &PosteriorCalibration, number: u64) -> Result<TruthOut
         .map_or(TruthOutcome::Unusable, |found| TruthOutcome::Posterior(Box::new(found), truth)))
 }
 
-fn name(quantity: usize) -> String {
-    let parameter = Parameter::ALL.get(quantity);
+/// Returns the name of quantity number `k`.
+fn name(k: usize) -> String {
+    let parameter = Parameter::OF_BONE.get(k);
     parameter.map_or("√(c1111/ρ)".to_owned(), |parameter| parameter.name().replace('_', " "))
 }
 
-/// Returns quantity number `k` of a point: the seven parameters, then √(c1111/ρ).
+/// Returns quantity number `k` of a point: the seven parameters of the bone, then √(c1111/ρ).
 fn quantity(point: &Point, k: usize) -> f64 {
-    point.0.get(k).copied().unwrap_or_else(|| bulk_velocity(point))
+    Parameter::OF_BONE.get(k).map_or_else(|| bulk_velocity(point), |&one| point.get(one))
 }
 
 /// Returns the number of draws below the truth in quantity number `k`.

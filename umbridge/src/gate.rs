@@ -1,6 +1,6 @@
 //! The gate: clients of UM-Bridge are answered, and requests that a page in the user's browser sends are not. Otherwise
-//! any page could have points computed, with the user's token on a cluster, and read the answers by a name that it lets
-//! lead here. The protocol's clients send any type of content or none (the one in C++ `text/plain`, curl that of
+//! any page could have points computed with the user's token on a cluster, and, if its own host name is made to resolve
+//! to this machine (DNS rebinding), read the answers. The protocol's clients send any type of content or none (the one in C++ `text/plain`, curl that of
 //! forms), so the type says nothing.
 
 use axum::extract::{Request, State};
@@ -12,7 +12,7 @@ use osteon_http::{OwnHosts, host_of, is_cross_site};
 use super::answers;
 use super::protocol_error::{ProtocolError, quoted};
 
-/// Answers a request, or refuses it before it is looked at.
+/// Passes a request on, or refuses it by its headers alone.
 pub(super) async fn guard(State(hosts): State<OwnHosts>, request: Request, next: Next) -> Response {
     match admit(&hosts, &request) {
         Ok(()) => next.run(request).await,
@@ -21,17 +21,17 @@ pub(super) async fn guard(State(hosts): State<OwnHosts>, request: Request, next:
 }
 
 fn admit<B>(hosts: &OwnHosts, request: &axum::http::Request<B>) -> Result<(), ProtocolError> {
-    // No browser leaves it out.
+    // Not from a browser: browsers always name the host.
     let Some(host) = host_of(request) else { return Ok(()) };
     if !hosts.contain(host) {
         let message = format!(
-            "the host {} is not known: the server answers for addresses, localhost and the name of this \
+            "the host {} is not known: the server answers for IP addresses, localhost and the name of this \
              machine; start it with --http-host NAME for another",
             quoted(host)
         );
         return Err(ProtocolError::input(message).with_status(StatusCode::MISDIRECTED_REQUEST));
     }
-    // Anybody may link to the front page, which is a sentence.
+    // Anybody may link to the front page, which only says what this server is.
     let is_front = request.uri().path() == "/";
     if !is_front && is_cross_site(request.headers(), request.method(), host) {
         let message = "the request comes from a page in a browser; this server is for programs";

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use crate::backend::{Backend, Computed, Done, Task};
 use crate::error::{PanickedCase, WorkerError};
 
-/// Maximum number of solvers that a worker keeps, each with up to 48 MB of tables. If the jobs that
+/// Maximum number of solvers that a worker keeps, each with up to 160 MB of tables. If the jobs that
 /// take turns have more setups than that, tables are rebuilt, which takes a small part of a batch's
 /// time.
 const SOLVERS_MAX: usize = 2;

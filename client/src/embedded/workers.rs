@@ -121,7 +121,7 @@ impl Workers {
     }
 }
 
-/// Keeps one worker running until `stopped` changes, or the worker has failed for good.
+/// Keeps one worker running until `stopped` changes, the workers are muted, or it has failed for good.
 async fn keep_running(
     number: u32,
     shared: Arc<SupervisorState>,
@@ -148,7 +148,7 @@ async fn keep_running(
                     }
                 }
             }
-            Err(error) => (format!("cannot be started: {error:#}"), String::new()),
+            Err(error) => (format!("could not be started: {error:#}"), String::new()),
         };
         if shared.muted.load(Ordering::Relaxed) {
             return;
@@ -160,14 +160,14 @@ async fn keep_running(
         let in_a_row = deaths.count(shared.progress.load(Ordering::Relaxed));
         if in_a_row >= DEATHS_IN_A_ROW_MAX {
             let error = anyhow!(
-                "worker {number} exited {in_a_row} times in a row without any progress; \
+                "worker {number} failed {in_a_row} times in a row without any progress; \
                  the last time it {death}{words}"
             );
             // If the channel is full, it already contains the failure of another worker.
             drop(failures.try_send(error));
             return;
         }
-        shared.listener.note(&format!("worker {number} {death}; starting another"));
+        shared.listener.note(&format!("worker {number} {death}; trying again"));
         let wait = Duration::from_millis(RESPAWN_MS * u64::from(in_a_row));
         tokio::select! {
             () = sleep(wait) => {}
@@ -227,6 +227,7 @@ async fn forward_stderr(
     }
 }
 
+/// Waits for the last lines of a worker that has ended; returns them for a message.
 async fn last_words(words: tokio::task::JoinHandle<VecDeque<String>>) -> String {
     match timeout(Duration::from_millis(STDERR_DRAIN_MS), words).await {
         Ok(Ok(lines)) => lines.iter().map(|line| format!("\n  {line}")).collect(),
@@ -237,7 +238,7 @@ async fn last_words(words: tokio::task::JoinHandle<VecDeque<String>>) -> String 
 fn describe_death(status: std::io::Result<ExitStatus>) -> String {
     match status {
         Ok(status) => format!("ended unexpectedly ({status})"),
-        Err(error) => format!("cannot be waited for: {error}"),
+        Err(error) => format!("could not be waited for: {error}"),
     }
 }
 
@@ -284,7 +285,7 @@ mod tests {
             Workers::start(executable, &endpoint, (2, 1), Arc::default(), Arc::new(Silent));
         let failure = workers.failed().await.to_string();
         workers.end().await;
-        assert!(failure.contains("exited 10 times in a row"), "{failure}");
+        assert!(failure.contains("failed 10 times in a row"), "{failure}");
         assert!(failure.contains("--coordinator"), "{failure}");
     }
 

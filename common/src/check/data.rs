@@ -289,7 +289,8 @@ fn velocities(
     }
 }
 
-/// Refuses velocities that are in another unit, either all of them or some.
+/// Refuses velocities that no bone has: all of them if their median is impossible, with the unit that would
+/// explain it if there is one, or else each.
 fn impossible(
     field: &str,
     measured: &[f64],

@@ -57,7 +57,7 @@ pub(super) fn posterior_of_job(specification: &JobSpecification, violations: &mu
     noise(specification, violations);
 }
 
-/// Refuses data of which only the moments are known: nothing says how accurate they are.
+/// Refuses moments without the number of velocities behind them: nothing says how accurate they are.
 fn noise(specification: &JobSpecification, violations: &mut Violations) {
     let unknown = specification
         .data
@@ -129,7 +129,7 @@ fn prior(parameter: Parameter, law: PosteriorPrior, range: Range, violations: &m
     }
 }
 
-/// Returns the logarithm of a bound, below which no log-normal law reaches.
+/// Returns the logarithm of a bound; -∞ for one at or below 0, where a log-normal law has nothing.
 fn logarithm(bound: f64) -> f64 {
     if bound > 0.0 { libm::log(bound) } else { f64::NEG_INFINITY }
 }

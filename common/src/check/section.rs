@@ -22,7 +22,8 @@ pub(crate) fn section(
     meaningless(name, &entries(section), &entries(default), violations);
 }
 
-/// Records the keys of a table, and of those in it, that are not meaningful and yet have a value.
+/// Records the keys of a table, and of the tables in it, that are not meaningful and yet differ from their
+/// defaults.
 fn meaningless(
     table: &str,
     entries: &[DeclaredKey],

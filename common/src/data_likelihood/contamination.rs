@@ -3,8 +3,9 @@
 //!
 //! The broad law is a Cauchy law about the median of the data with a scale of ten robust standard
 //! deviations. ε is unknown; its prior is Beta(1, 49), with a mean of 1/50, and it is integrated out.
-//! Velocities near the median, the core, are from the model's law for certain, as its density is far
-//! above ε times the broad law's there: their sums stay sufficient. All others are mixtures.
+//! Velocities near the median, the core, count as the model's, which keeps their sums sufficient: for
+//! independent ones its density is ten times ε times the broad law's at the end of the core. With subjects
+//! the core reaches as far as velocities are not outlying. All others are mixtures.
 
 use std::f64::consts::PI;
 
@@ -12,27 +13,26 @@ use crate::robust::RobustScale;
 
 /// Scale of the broad law in robust standard deviations.
 const BROAD: f64 = 10.0;
-/// The prior of ε has the density 49 (1 - ε)⁴⁸.
+/// Second parameter b of the prior of ε, Beta(1, b), whose density is b (1 - ε)^(b - 1).
 const PRIOR: f64 = 49.0;
 /// Number of values of ε, evenly spaced in ln ε.
 const RATES: usize = 24;
 /// Distance from the median, in robust standard deviations, within which independent velocities are
-/// of the core: a normal density there is ten times ε times the broad law's even for ε = 0.015.
+/// of the core: a normal density there is ten times ε times the broad law's for ε = 0.015.
 const CORE: f64 = 3.0;
 /// Velocities outside the core that are this close together, in robust standard deviations, count as
 /// equal; for more different ones than [`FAR_MAX`], the distance is doubled until they fit.
 const CLOSE: f64 = 0.01;
 /// Maximum number of different velocities outside the core.
 const FAR_MAX: usize = 200;
-/// Densities are multiplied by so many before a logarithm is taken: none is below the smallest ε.
+/// Number of mixture densities, in units of the broad law's, that are multiplied before a logarithm is
+/// taken. Each is at least ε, so that the product does not underflow.
 const FACTORS: usize = 16;
 
-/// The velocities outside the core, and the laws that they may have.
+/// Velocities that are not in the core, and the laws that they may have.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Contamination {
-    /// Number of velocities in the core.
-    core: f64,
-    /// The others, in ascending order.
+    /// The velocities outside the core, in ascending order.
     far: Vec<FarVelocity>,
     /// Values of ε, with the logarithm of their weight times (1 - ε) for each velocity of the core.
     rates: Vec<(f64, f64)>,
@@ -66,8 +66,8 @@ impl Contamination {
         scale.deviations(velocity).abs() > radius
     }
 
-    /// Creates it for `core` velocities in the core and these others (m/s), of which there is at
-    /// least one; `centre` is that of the likelihood.
+    /// Creates it for `core` velocities in the core and the others, `far` (m/s); `None` if there are no
+    /// others. `centre` is that of the likelihood.
     pub(super) fn new(scale: &RobustScale, core: usize, far: &[f64], centre: f64) -> Option<Self> {
         if far.is_empty() {
             return None;
@@ -87,9 +87,8 @@ impl Contamination {
             FarVelocity { offset: velocity - centre, count, broad }
         };
         let far = different.into_iter().map(velocity).collect::<Vec<FarVelocity>>();
-        let core = core as f64;
         let outside: f64 = far.iter().map(|one| one.count).sum();
-        Some(Self { core, far, rates: rates(core, outside) })
+        Some(Self { far, rates: rates(core as f64, outside) })
     }
 
     /// Returns the logarithm of the density of the velocities outside the core, times (1 - ε) for

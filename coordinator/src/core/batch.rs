@@ -13,14 +13,13 @@ pub(crate) struct Batch {
     pub(crate) worker: WorkerId,
     pub(crate) sent: Duration,
     /// Time when its worker could begin it: when it was sent, or when the worker answered the batch
-    /// that it had been sent before, whichever was later.
+    /// sent to it before this one, whichever was later.
     pub(crate) begun: Duration,
     /// Computing time that was charged to its client.
     pub(crate) charged: Duration,
     /// The other batches with the same indices and purpose, held by other workers.
     pub(crate) duplicates: Vec<BatchId>,
-    /// Number of duplicates that were sent before this one, each because its predecessor was
-    /// overdue.
+    /// 0, or for a duplicate sent because a batch was overdue: one more than that batch's.
     pub(crate) retries: u32,
 }
 
@@ -45,8 +44,8 @@ impl Batch {
     }
 }
 
-/// Why a batch is computed. Duplicates have the same purpose. Being a duplicate is a relation
-/// between batches, not a purpose, because the order in which they were sent decides nothing.
+/// Why a batch is computed. A duplicate has the purpose of the batch that it duplicates: of both answers
+/// the first counts, whichever batch was sent first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// It fills indices of the evaluation that the search asked for.

@@ -105,7 +105,8 @@ impl<'a> TableLines<'a> {
         record.lines().skip(1).any(is_row)
     }
 
-    /// Returns whether the last column has a cell, and is behind that of the velocities, in a table with commas.
+    /// Returns whether, in a table with commas, the last column is not that of the velocities but behind it, and
+    /// is not empty in this row.
     fn is_filled_behind(&self, fields: &[String]) -> bool {
         let last = self.header.names.len().saturating_sub(1);
         self.header.separator == Separator::Comma
@@ -119,18 +120,12 @@ impl<'a> TableLines<'a> {
         let place = self.place?;
         let first = fields.iter().find(|field| !field.is_empty())?;
         let before = place.checked_sub(1).and_then(|place| fields.get(place));
-        let of_place = fields.get(place).filter(|field| *field != first);
-        SummaryLabel::recognize(first)
-            .or_else(|| {
-                before
-                    .filter(|field| *field != first)
-                    .and_then(|field| SummaryLabel::recognize(field))
-            })
-            .or_else(|| of_place.and_then(|field| SummaryLabel::recognize(field)))
+        let cells = [Some(first), before, fields.get(place)];
+        cells.into_iter().flatten().find_map(|cell| SummaryLabel::recognize(cell))
     }
 }
 
-/// Returns whether fields are the names of the columns; what follows in the header may be missing at the end.
+/// Returns whether fields are the names of the columns; an empty first one, above names of rows, may be missing.
 fn is_header(fields: &[String], names: &[String]) -> bool {
     let names = if names.first().is_some_and(String::is_empty) && fields.len() < names.len() {
         &names[1..]
@@ -152,9 +147,10 @@ impl Iterator for TableLines<'_> {
             };
             if record.is_blank() {
                 self.is_after_gap = true;
+                continue;
             }
-            self.comments += usize::from(record.is_comment());
-            if record.is_blank() || record.is_comment() {
+            if record.is_comment() {
+                self.comments += 1;
                 continue;
             }
             let fields = csv_fields(record.text, self.header.separator);

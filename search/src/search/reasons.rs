@@ -69,7 +69,7 @@ pub(super) fn ending(
         StopReason::CostReached => (Status::Converged, None),
         StopReason::Converged => settled(evidence, specification),
         StopReason::EvaluationsUsedUp if evidence.best.is_none() => {
-            (Status::Failed, Some(no_feasible_point(evidence, specification)))
+            (Status::Failed, Some(no_usable_point(evidence, specification)))
         }
         StopReason::EvaluationsUsedUp => (Status::MaxEvaluations, used_up(evidence, specification)),
         StopReason::RestartsUsedUp => {
@@ -79,9 +79,7 @@ pub(super) fn ending(
             );
             (Status::MaxEvaluations, Some(reason))
         }
-        StopReason::Infeasible => {
-            (Status::Failed, Some(no_feasible_point(evidence, specification)))
-        }
+        StopReason::Infeasible => (Status::Failed, Some(no_usable_point(evidence, specification))),
     };
     let reason = match evidence.posterior {
         Some(SearchOutcome::NothingMatches) if specification.is_searched() => {
@@ -146,15 +144,16 @@ fn advice(specification: &JobSpecification, held_by_bounds: bool) -> String {
     choices.join(", or ")
 }
 
-/// Returns whether the lowest cost need not match all moments: that of a likelihood, with priors, or of
-/// more than two moments by fewer parameters.
+/// Returns whether the lowest cost need not match all moments: that of a likelihood, with priors, or with
+/// other observables, of which there may be more than free parameters.
 fn is_compromise(specification: &JobSpecification) -> bool {
     specification.objective == Objective::Likelihood
         || specification.has_priors()
         || !specification.observables().is_empty()
 }
 
-/// Explains how far off the best point is after the last evaluation, unless it matches.
+/// Explains how far off the best point is after the last evaluation; `None` if it matches, need not match,
+/// or cannot be compared.
 fn used_up(evidence: &Evidence<'_>, specification: &JobSpecification) -> Option<String> {
     let (best, agreement) = evidence.best.zip(evidence.agreement.as_ref())?;
     if agreement.matched || is_compromise(specification) {
@@ -301,7 +300,8 @@ pub(super) fn failed(row: &Evaluation, specification: &JobSpecification) -> Stri
     )
 }
 
-fn no_feasible_point(evidence: &Evidence<'_>, specification: &JobSpecification) -> String {
+/// Explains a failure: no point is feasible, or none has a cost from which the search could go on.
+fn no_usable_point(evidence: &Evidence<'_>, specification: &JobSpecification) -> String {
     if evidence.best.is_some() {
         return "all velocities at the evaluated points are equal: their coefficient of variation is \
                 0 and has no logarithm; raise [monte_carlo] realizations"

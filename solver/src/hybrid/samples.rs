@@ -6,7 +6,7 @@ use crate::picking::PressureExtremum;
 
 /// Samples of one interpolating polynomial.
 const POINTS: usize = 8;
-/// Number of bisections of an interval; after them Newton's method could not improve the result.
+/// Number of bisections of an interval; after them rounding limits the result.
 const BISECTIONS: usize = 44;
 
 /// Centre of the low-pass filter's fall, as a fraction of the band, and its width.
