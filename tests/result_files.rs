@@ -248,8 +248,14 @@ fn documented_is_real(runs: &Runs) {
                 "NAME" => vec!["longitudinal_young_modulus".to_owned()],
                 "NAME_lower" => vec!["longitudinal_young_modulus_lower".to_owned()],
                 "NAME_upper" => vec!["longitudinal_young_modulus_upper".to_owned()],
-                "reason" | "check" | "cost_standard_error" | "failure" | "integrity" | "decay"
-                | "other_velocity" | "center_frequency"
+                "reason"
+                | "check"
+                | "cost_standard_error"
+                | "failure"
+                | "integrity"
+                | "decay"
+                | "other_velocity"
+                | "center_frequency"
                     if !real.contains(&name) =>
                 {
                     Vec::new()
