@@ -42,7 +42,11 @@ impl ExpectedEvaluations {
 fn searched(specification: &JobSpecification, end: usize) -> u64 {
     let search = &specification.search;
     let free = specification.free().count() as u64;
-    let of_setup = specification.free().filter(|one| one.of_setup().is_some()).count() as u64;
+    // What no closed form tells of is measured at the first point.
+    let unknown = match specification.observables().is_empty() {
+        true => specification.free().filter(|one| one.of_setup().is_some()).count() as u64,
+        false => free,
+    };
     let each = |evaluations: u64| evaluations.min(search.max_evaluations);
     let searches = match search.method {
         SearchMethod::Simplex => {
@@ -50,10 +54,9 @@ fn searched(specification: &JobSpecification, end: usize) -> u64 {
             each(base + slope * free).saturating_mul(search.starts)
         }
         SearchMethod::Newton => {
-            // What parameters of the setup do is measured at the first point.
             let (first, other) = NEWTON[end];
-            let others = each(other + of_setup).saturating_mul(search.starts.saturating_sub(1));
-            each(first + of_setup).saturating_add(others)
+            let others = each(other + unknown).saturating_mul(search.starts.saturating_sub(1));
+            each(first + unknown).saturating_add(others)
         }
         SearchMethod::Posterior => return 0,
     };

@@ -93,7 +93,8 @@ const KEYS_OF_GROUPS: [Key; 3] = [
     Key {
         name: "groups",
         meaning: "instead of a file: a table with a list of velocities for each group name, or with a \
-                  table of `velocities`, `subjects`, `decays`, and quantities that are `known` of the group",
+                  table of `velocities`, `subjects`, other observables such as `decays`, and quantities that are \
+                  `known` of the group",
     },
     Key {
         name: "subjects",
