@@ -1,4 +1,4 @@
-//! Identifications from velocities and decays: what the decays add, and that workers change nothing.
+//! Identifications from velocities and other observables: what these add, and that workers change nothing.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
@@ -71,6 +71,39 @@ fn decays_find_what_velocities_leave_open() {
     let again = scratch.write("again.toml", &fs::read_to_string(out.join("job.toml")).unwrap());
     let again = run(&["identify", text(&again), "--json"]).json();
     assert_eq!(again["digest"], found["digest"]);
+}
+
+/// With all three observables four parameters are determined, by Newton's search, too.
+#[test]
+fn the_table_of_observe_is_data_of_an_identification() {
+    let scratch = Scratch::new();
+    let bones = scratch.write(
+        "bones.toml",
+        "[parameters]\nmaterial = \"human-radius-desceliers\"\ndispersion = { fixed = 0.1 }\n\
+         [monte_carlo]\nrealizations = 60\nseed = 7\n",
+    );
+    let table = scratch.path("observed.csv");
+    run(&["observe", text(&bones), "--out", text(&table)]).succeeded();
+    let job = scratch.write(
+        "job.toml",
+        "[data]\nvelocities = \"observed.csv\"\ndecay = \"decay\"\n\
+         other_velocity = \"other_velocity\"\ncenter_frequency = \"center_frequency\"\n\
+         [parameters]\nmaterial = \"human-radius-desceliers\"\n\
+         longitudinal_young_modulus = { start = 20.0e9, bounds = [14.0e9, 25.0e9] }\n\
+         longitudinal_shear_modulus = { start = 4.2e9, bounds = [3.0e9, 6.5e9] }\n\
+         transverse_young_modulus = { start = 12.0e9, bounds = [8.0e9, 16.0e9] }\n\
+         dispersion = { start = 0.15, bounds = [0.02, 0.3] }\n\
+         [monte_carlo]\nsampling = \"sobol\"\nrealizations = 64\ncontrol_variate = true\n\
+         [search]\nmethod = \"newton\"\n",
+    );
+    let found = run(&["identify", text(&job), "--json"]).json();
+    assert_eq!(found["identified"]["matched"], true, "{found}");
+    for (name, truth) in TRUTHS.into_iter().chain([("longitudinal_shear_modulus", 4.795e9)]) {
+        let known = &found["identified"]["parameters"][name];
+        let [lower, upper] = [0, 1].map(|end| known["interval"][end].as_f64().unwrap());
+        assert!((lower..upper).contains(&truth), "{name}: {known}");
+    }
+    assert!(found["center_frequency"]["mean"].as_f64().unwrap() > 1e6);
 }
 
 /// Every answer is computed by two workers and compared, decays included.

@@ -31,6 +31,7 @@ mod pareto;
 mod pivot;
 mod population;
 mod prior;
+mod proposal;
 mod summary;
 mod surrogate;
 #[cfg(test)]

@@ -13,8 +13,6 @@ use super::surrogate::{Scale, Surrogate};
 
 /// Sobol' points of the populations from which points to evaluate are drawn.
 const SCOUTS: u64 = 2048;
-/// Effective draws of such a population that are enough.
-const USEFUL: f64 = 2.0 * BATCH as f64;
 /// Draws of each batch that check the interpolation.
 const BATCH: usize = 32;
 /// Further points of each batch, where draws matter that the interpolation knows least.
@@ -188,7 +186,7 @@ impl PosteriorSearch {
         if passed || left == 0 {
             return;
         }
-        let mut population = problem.rich_population(&self.surrogate, SCOUTS, number, USEFUL);
+        let mut population = problem.population(&self.surrogate, SCOUTS, number);
         self.nothing_matches = population.members.is_empty();
         if self.nothing_matches {
             let skipped = self.explored as usize * BATCH;

@@ -44,6 +44,11 @@ impl Cholesky {
         x
     }
 
+    /// Returns L x.
+    pub(super) fn multiply(&self, x: &[f64]) -> Vec<f64> {
+        self.rows.iter().map(|row| dot(row, &x[..row.len()])).collect()
+    }
+
     /// Returns half the logarithm of the determinant.
     pub(super) fn half_log_determinant(&self) -> f64 {
         self.rows.iter().enumerate().map(|(k, row)| libm::log(row[k])).sum()

@@ -9,13 +9,14 @@ use osteon_common::ensemble::GERMS;
 use osteon_common::germ_source::sobol_points;
 use osteon_common::job::JobSpecification;
 use osteon_common::moments::MomentVector;
-use osteon_common::parameters::{Parameter, Point};
+use osteon_common::parameters::{PARAMETERS, Parameter, Point};
 
 use super::features::{Features, features};
 use super::likelihood::SetLikelihood;
 use super::moments_grid::{LogSpan, MomentsGrid};
 use super::pivot::{Pivots, solve};
 use super::prior::ParameterPrior;
+use super::proposal::Proposal;
 use super::surrogate::{RULE_OF_THUMB, Scale, Surrogate};
 use crate::search_box::admissible;
 
@@ -36,8 +37,9 @@ const OVERSHOOT: f64 = 0.1;
 /// Step of the derivatives by the pivots, relative to the bounds' distance.
 const STEP: f64 = 1e-5;
 
-/// How often a population may be drawn anew from four times as many points.
-const RICHER_MAX: u32 = 2;
+/// How often a population is drawn anew about the weights of the one before, if other observables were
+/// measured.
+const PROPOSALS: usize = 2;
 /// Power of the likelihood of widened populations.
 const WIDENED: f64 = 0.5;
 
@@ -64,6 +66,9 @@ pub(super) struct Member {
     pub(super) moments: MomentVector,
     /// Logarithm of the weight, with any common factor.
     pub(super) log_weight: f64,
+    /// Parameters other than the pivots, in the coordinates in which their prior is uniform from 0 to 1;
+    /// the rest is 0.
+    coordinates: [f64; PARAMETERS],
 }
 
 /// Weighted points.
@@ -116,34 +121,45 @@ impl PosteriorProblem {
     /// Draws the population of an interpolated model from `count` Sobol' points; `number` chooses
     /// among independent ones.
     pub(super) fn population(&self, model: &Surrogate, count: u64, number: u64) -> Population {
+        let mut population = self.drawn_by(None, model, count, number);
+        if self.likelihood.observables().is_empty() || self.drawn_parameters() == 0 {
+            return population;
+        }
+        for _ in 0..PROPOSALS {
+            let Some(proposal) = self.proposal(&population) else { break };
+            population = self.drawn_by(Some(&proposal), model, count, number);
+        }
+        population
+    }
+
+    /// Draws a population whose parameters other than the pivots come from a proposal, or the prior.
+    fn drawn_by(
+        &self,
+        proposal: Option<&Proposal>,
+        model: &Surrogate,
+        count: u64,
+        number: u64,
+    ) -> Population {
         let points = sobol_points(self.seed, u64::MAX - 1 - number, count);
         let branches = self.pivots.branches();
-        let members = points.iter().flat_map(|uniforms| {
-            (0..branches).filter_map(move |branch| self.member(model, uniforms, branch))
+        let members = points.iter().enumerate().flat_map(|(index, uniforms)| {
+            let place = (proposal, index);
+            (0..branches).filter_map(move |branch| self.member(model, place, uniforms, branch))
         });
         Population::new(members.collect())
     }
 
-    /// Draws a population as above, from four times as many points as long as fewer than `useful` draws
-    /// of it count: points match the velocities by their pivots, but other observables only by chance.
-    pub(super) fn rich_population(
-        &self,
-        model: &Surrogate,
-        count: u64,
-        number: u64,
-        useful: f64,
-    ) -> Population {
-        let mut population = self.population(model, count, number);
-        if self.likelihood.observables().is_empty() || self.is_of_few() {
-            return population;
-        }
-        for richer in 1..=RICHER_MAX {
-            if population.effective() >= useful {
-                break;
-            }
-            population = self.population(model, count << (2 * richer), number);
-        }
-        population
+    /// Returns the law about the weights of a population; `None` if these do not scatter.
+    fn proposal(&self, population: &Population) -> Option<Proposal> {
+        let drawn = self.drawn_parameters();
+        let coordinates: Vec<&[f64]> =
+            population.members.iter().map(|member| &member.coordinates[..drawn]).collect();
+        Proposal::about(&coordinates, &population.weights)
+    }
+
+    /// Returns the number of free parameters that are not pivots.
+    fn drawn_parameters(&self) -> usize {
+        self.priors.iter().filter(|prior| !self.is_pivot(prior.parameter)).count()
     }
 
     /// Returns the sum of square errors of the compared moments, in units of the data's noise.
@@ -169,13 +185,26 @@ impl PosteriorProblem {
         Population::new(population.members.into_iter().map(wider).collect())
     }
 
-    fn member(&self, model: &Surrogate, uniforms: &[f64; GERMS], branch: usize) -> Option<Member> {
+    fn member(
+        &self,
+        model: &Surrogate,
+        (proposal, index): (Option<&Proposal>, usize),
+        uniforms: &[f64; GERMS],
+        branch: usize,
+    ) -> Option<Member> {
         let wanted = [self.pivots.mean.is_some(), self.pivots.dispersion];
         let draw = self.grid.draw(wanted, [uniforms[0], uniforms[1]]);
         let mut point = self.base;
-        let mut uniforms = uniforms[2..].iter();
-        for prior in self.priors.iter().filter(|prior| !self.is_pivot(prior.parameter)) {
-            point.0[prior.parameter as usize] = prior.quantile(*uniforms.next()?);
+        let own = &uniforms[2..2 + self.drawn_parameters()];
+        let drawn = proposal.map_or_else(|| own.to_vec(), |proposal| proposal.draw(index, own));
+        let mut coordinates = [0.0; PARAMETERS];
+        let priors = self.priors.iter().filter(|prior| !self.is_pivot(prior.parameter));
+        for ((prior, &u), slot) in priors.zip(&drawn).zip(&mut coordinates) {
+            if !(0.0..1.0).contains(&u) {
+                return None;
+            }
+            point.0[prior.parameter as usize] = prior.quantile(u);
+            *slot = u;
         }
         let point = self.solved(model, point, draw.at, branch)?;
         let mut log_prior = 0.0;
@@ -187,9 +216,13 @@ impl PosteriorProblem {
         }
         let moments = moments(model, &point)?;
         let jacobian = self.jacobian(model, &point, [moments[0], moments[1]])?;
-        let log_weight =
-            log_prior + self.likelihood.log(&moments) - draw.log_density - libm::log(jacobian);
-        log_weight.is_finite().then_some(Member { point, moments, log_weight })
+        let log_proposal = proposal.map_or(0.0, |proposal| proposal.log_density(&drawn));
+        let log_weight = log_prior + self.likelihood.log(&moments)
+            - draw.log_density
+            - libm::log(jacobian)
+            - log_proposal;
+        let member = Member { point, moments, log_weight, coordinates };
+        log_weight.is_finite().then_some(member)
     }
 
     /// Solves for the pivots: returns the point at which the model has the moments `wanted`, as far

@@ -109,7 +109,7 @@ impl PosteriorSearch {
     /// Returns the draws of the final interpolation.
     fn final_population(&self, problem: &PosteriorProblem) -> Population {
         let points = POINTS[usize::from(!problem.is_of_few())];
-        problem.rich_population(&self.surrogate, points, self.populations, 2.0 * EFFECTIVE_MIN)
+        problem.population(&self.surrogate, points, self.populations)
     }
 }
 
