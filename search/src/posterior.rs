@@ -24,6 +24,7 @@ mod batches;
 mod check;
 mod cholesky;
 mod density;
+mod draw_law;
 mod features;
 mod likelihood;
 mod moments_grid;
@@ -31,7 +32,6 @@ mod pareto;
 mod pivot;
 mod population;
 mod prior;
-mod proposal;
 mod summary;
 mod surrogate;
 #[cfg(test)]

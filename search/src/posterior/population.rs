@@ -11,12 +11,12 @@ use osteon_common::job::JobSpecification;
 use osteon_common::moments::MomentVector;
 use osteon_common::parameters::{PARAMETERS, Parameter, Point};
 
+use super::draw_law::DrawLaw;
 use super::features::{Features, features};
 use super::likelihood::SetLikelihood;
 use super::moments_grid::{LogSpan, MomentsGrid};
 use super::pivot::{Pivots, solve};
 use super::prior::ParameterPrior;
-use super::proposal::Proposal;
 use super::surrogate::{RULE_OF_THUMB, Scale, Surrogate};
 use crate::search_box::admissible;
 
@@ -39,7 +39,7 @@ const STEP: f64 = 1e-5;
 
 /// How often a population is drawn anew about the weights of the one before, if other observables were
 /// measured.
-const PROPOSALS: usize = 2;
+const LAWS: usize = 2;
 /// Power of the likelihood of widened populations.
 const WIDENED: f64 = 0.5;
 
@@ -125,17 +125,17 @@ impl PosteriorProblem {
         if self.likelihood.observables().is_empty() || self.drawn_parameters() == 0 {
             return population;
         }
-        for _ in 0..PROPOSALS {
-            let Some(proposal) = self.proposal(&population) else { break };
-            population = self.drawn_by(Some(&proposal), model, count, number);
+        for _ in 0..LAWS {
+            let Some(law) = self.draw_law(&population) else { break };
+            population = self.drawn_by(Some(&law), model, count, number);
         }
         population
     }
 
-    /// Draws a population whose parameters other than the pivots come from a proposal, or the prior.
+    /// Draws a population whose parameters other than the pivots come from a law, or from the prior.
     fn drawn_by(
         &self,
-        proposal: Option<&Proposal>,
+        law: Option<&DrawLaw>,
         model: &Surrogate,
         count: u64,
         number: u64,
@@ -143,18 +143,18 @@ impl PosteriorProblem {
         let points = sobol_points(self.seed, u64::MAX - 1 - number, count);
         let branches = self.pivots.branches();
         let members = points.iter().enumerate().flat_map(|(index, uniforms)| {
-            let place = (proposal, index);
+            let place = (law, index);
             (0..branches).filter_map(move |branch| self.member(model, place, uniforms, branch))
         });
         Population::new(members.collect())
     }
 
     /// Returns the law about the weights of a population; `None` if these do not scatter.
-    fn proposal(&self, population: &Population) -> Option<Proposal> {
+    fn draw_law(&self, population: &Population) -> Option<DrawLaw> {
         let drawn = self.drawn_parameters();
         let coordinates: Vec<&[f64]> =
             population.members.iter().map(|member| &member.coordinates[..drawn]).collect();
-        Proposal::about(&coordinates, &population.weights)
+        DrawLaw::about(&coordinates, &population.weights)
     }
 
     /// Returns the number of free parameters that are not pivots.
@@ -188,7 +188,7 @@ impl PosteriorProblem {
     fn member(
         &self,
         model: &Surrogate,
-        (proposal, index): (Option<&Proposal>, usize),
+        (law, index): (Option<&DrawLaw>, usize),
         uniforms: &[f64; GERMS],
         branch: usize,
     ) -> Option<Member> {
@@ -196,7 +196,7 @@ impl PosteriorProblem {
         let draw = self.grid.draw(wanted, [uniforms[0], uniforms[1]]);
         let mut point = self.base;
         let own = &uniforms[2..2 + self.drawn_parameters()];
-        let drawn = proposal.map_or_else(|| own.to_vec(), |proposal| proposal.draw(index, own));
+        let drawn = law.map_or_else(|| own.to_vec(), |law| law.draw(index, own));
         let mut coordinates = [0.0; PARAMETERS];
         let priors = self.priors.iter().filter(|prior| !self.is_pivot(prior.parameter));
         for ((prior, &u), slot) in priors.zip(&drawn).zip(&mut coordinates) {
@@ -216,11 +216,11 @@ impl PosteriorProblem {
         }
         let moments = moments(model, &point)?;
         let jacobian = self.jacobian(model, &point, [moments[0], moments[1]])?;
-        let log_proposal = proposal.map_or(0.0, |proposal| proposal.log_density(&drawn));
+        let log_law = law.map_or(0.0, |law| law.log_density(&drawn));
         let log_weight = log_prior + self.likelihood.log(&moments)
             - draw.log_density
             - libm::log(jacobian)
-            - log_proposal;
+            - log_law;
         let member = Member { point, moments, log_weight, coordinates };
         log_weight.is_finite().then_some(member)
     }

@@ -19,12 +19,12 @@ const VARIANCE_MIN: f64 = 1e-12;
 
 /// A mixture of the prior and a normal law.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Proposal {
+pub(super) struct DrawLaw {
     mean: Vec<f64>,
     factor: Cholesky,
 }
 
-impl Proposal {
+impl DrawLaw {
     /// Returns the law about weighted coordinates, whose weights add up to 1; `None` if they do not
     /// scatter, as with a single one.
     pub(super) fn about(coordinates: &[&[f64]], weights: &[f64]) -> Option<Self> {
@@ -82,19 +82,19 @@ mod tests {
             })
             .collect();
         let places: Vec<&[f64]> = coordinates.iter().map(<[f64; 2]>::as_slice).collect();
-        let proposal = Proposal::about(&places, &[1.0 / 40.0; 40]).unwrap();
+        let law = DrawLaw::about(&places, &[1.0 / 40.0; 40]).unwrap();
         let (mut sum, mut mean, count) = (0.0, [0.0; 2], 40_000_u64);
         for index in 0..count {
             let germs = Germs::draw(4, index);
-            let at = proposal.draw(index as usize, &germs.values()[..2]);
+            let at = law.draw(index as usize, &germs.values()[..2]);
             if at.iter().all(|u| (0.0..1.0).contains(u)) {
-                let weight = libm::exp(-proposal.log_density(&at));
+                let weight = libm::exp(-law.log_density(&at));
                 sum += weight;
                 mean.iter_mut().zip(at).for_each(|(mean, u)| *mean += weight * u);
             }
         }
         assert!((sum / count as f64 - 1.0).abs() < 0.02, "{sum}");
         assert!(mean.iter().all(|mean| (mean / sum - 0.5).abs() < 0.02), "{mean:?}");
-        assert_eq!(Proposal::about(&places[..1], &[1.0]), None);
+        assert_eq!(DrawLaw::about(&places[..1], &[1.0]), None);
     }
 }
