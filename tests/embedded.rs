@@ -378,7 +378,7 @@ fn a_propagation_above_the_accepted_fraction_fails() {
 #[test]
 fn a_run_of_ones_own_has_a_page_until_it_ends() {
     let scratch = Scratch::new();
-    let (file, log) = (scratch.write("job.toml", &job(40, 300)), scratch.path("run.log"));
+    let (file, log) = (scratch.write("job.toml", &job(1000, 300)), scratch.path("run.log"));
     let mut command = osteon();
     // The page is that of this machine, whatever the variable says.
     command.env("OSTEON_COORDINATOR", "http://127.0.0.1:1");

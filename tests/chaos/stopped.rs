@@ -107,7 +107,7 @@ fn a_client_that_stands_still_goes_on_waiting() {
 #[test]
 fn a_run_that_stands_still_goes_on() {
     let scratch = Scratch::new();
-    let file = scratch.write("job.toml", &job(50, 30));
+    let file = scratch.write("job.toml", &job(200, 60));
     let digest = undisturbed("identify", &file);
     let (out, log) = (scratch.path("out"), scratch.path("run.log"));
     let said = || fs::read_to_string(&log).unwrap();
