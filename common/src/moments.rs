@@ -52,19 +52,22 @@ impl ComparedMoments {
     /// the model's is not known.
     pub fn in_logarithms(&self, data: &Self) -> MomentVector {
         let Moments { mean, coefficient_of_variation } = self.velocities;
-        let [_, _, observables @ ..] = self.differences(data);
         let logarithms = [mean, coefficient_of_variation].map(libm::log);
-        moment_vector(logarithms, |one| observables[one as usize])
+        moment_vector(logarithms, |one| self.difference_of_means(data, one))
     }
 
     /// Returns the differences from the moments of data, in the observables that these have; NaN where
     /// the model's are not known.
     pub fn differences(&self, data: &Self) -> MomentVector {
-        let [mean, variation] = log_ratios(self.velocities, data.velocities);
-        moment_vector([mean, variation], |one| match data.observables[one] {
-            Some(measured) => (self.observables[one].unwrap_or(f64::NAN) - measured) / measured,
+        let of_velocities = log_ratios(self.velocities, data.velocities);
+        moment_vector(of_velocities, |one| self.difference_of_means(data, one))
+    }
+
+    fn difference_of_means(&self, data: &Self, observable: Observable) -> f64 {
+        match data.observables[observable] {
+            Some(mean) => (self.observables[observable].unwrap_or(f64::NAN) - mean) / mean,
             None => 0.0,
-        })
+        }
     }
 }
 

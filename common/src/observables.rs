@@ -1,8 +1,8 @@
 //! The table of observables: what is computed of a realization, and may be measured, besides the
 //! velocity of its first signal.
 //!
-//! Of each observable that a job has data of, the model's mean over the realizations is compared with
-//! the mean of the data (`inference/weights.rs`). `CONTRIBUTING.md` lists what a new row needs.
+//! Where a job has data of an observable, its mean over the realizations of the model is compared with its
+//! mean over the data (`inference/weights.rs`). `CONTRIBUTING.md` lists what a new row needs.
 
 use std::array;
 use std::collections::BTreeMap;
@@ -31,7 +31,7 @@ pub enum Observable {
     CenterFrequency,
 }
 
-/// What all parts of the program have to know of an observable.
+/// A row of the table: everything about an observable that is not computed.
 #[derive(Debug)]
 pub struct ObservableRow {
     /// Name in results, and of the key that names its column in `[data]`.
@@ -46,7 +46,7 @@ pub struct ObservableRow {
     pub unit: &'static str,
     /// Accepted measured values.
     pub accepted: Interval,
-    /// What the mean of the data must be above 0 for.
+    /// Reason why the mean of the data must be above 0, for a message.
     pub above_zero: &'static str,
     /// Meaning of the key that names its column, for the reference of job files.
     pub of_column: &'static str,

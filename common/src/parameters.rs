@@ -48,7 +48,7 @@ pub enum Parameter {
     CouplingSoundSpeed,
 }
 
-/// What all parts of the program have to know of a parameter.
+/// A row of the table of parameters: everything about a parameter that is not computed.
 #[derive(Debug)]
 pub struct ParameterRow {
     /// Name in files and messages.

@@ -14,7 +14,7 @@ use crate::violations::Violations;
 use crate::visible;
 
 use super::observables::observables;
-use super::value::{known_wrong, number, quantity, whole};
+use super::value::{REFUSED_MAX, elements, known_wrong, number, quantity, whole};
 
 /// Accepted values of a measured velocity.
 pub const VELOCITY: Interval = Interval::above(0.0, "m/s");
@@ -32,9 +32,6 @@ pub const COUNT: WholeRange = WholeRange::new(VELOCITIES_MIN as u64, limits::DAT
 /// The forms in which `[data]` may be given.
 pub const DATA_FORMS: &str =
     "give either velocities, or groups, or mean and coefficient_of_variation";
-
-/// Maximum number of velocities that are refused individually.
-const REFUSED_MAX: usize = 10;
 
 /// Returns the message for an identification without data.
 pub fn no_data() -> String {
@@ -239,15 +236,7 @@ fn each_velocity(field: &str, measured: &[f64], violations: &mut Violations) -> 
         violations.add(field, format!("has {count} velocities; at most {max}"));
         return false;
     }
-    let refused =
-        measured.iter().enumerate().filter(|&(_, &velocity)| !VELOCITY.contains(velocity));
-    for (refusals, (index, &velocity)) in refused.enumerate() {
-        if refusals == REFUSED_MAX {
-            violations.add_more(field, "more velocities out of range are not listed");
-            return false;
-        }
-        violations.add(element_path(field, index), VELOCITY.refusal(velocity));
-    }
+    elements(field, measured, (VELOCITY, "velocities"), violations);
     !violations.has_at_or_below(field)
 }
 

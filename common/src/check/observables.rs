@@ -1,7 +1,7 @@
 //! Rules on measured observables besides the velocity.
 
-use crate::data::{Data, VelocitySet};
-use crate::field_path::{element_path, entry_path};
+use crate::data::{Data, Group, VelocitySet};
+use crate::field_path::entry_path;
 use crate::inference::{MomentWeights, OBSERVED_PARTS_MIN};
 use crate::job::{JobKind, JobSpecification};
 use crate::limits::DATA_VELOCITIES_MAX;
@@ -10,10 +10,7 @@ use crate::origin::Origin;
 use crate::statistics::measured_observables;
 use crate::violations::Violations;
 
-use super::value::known_wrong;
-
-/// Maximum number of values that are refused individually.
-const REFUSED_MAX: usize = 10;
+use super::value::{elements, known_wrong};
 
 /// Checks the observables of all sets, of each of which there have to be as many as velocities.
 pub(super) fn observables(data: &Data, origin: Option<&Origin>, violations: &mut Violations) {
@@ -30,12 +27,14 @@ pub(super) fn observables(data: &Data, origin: Option<&Origin>, violations: &mut
     }
     for observable in Observable::ALL {
         if has_all_or_none(data, observable, violations) {
-            (0..data.sets()).for_each(|set| of_set(data, origin, (set, observable), violations));
+            (0..data.sets())
+                .for_each(|set| values_of_set(data, origin, (set, observable), violations));
         }
     }
 }
 
-fn of_set(
+/// Checks the values of an observable of one set, if it has some.
+fn values_of_set(
     data: &Data,
     origin: Option<&Origin>,
     (number, observable): (usize, Observable),
@@ -54,14 +53,7 @@ fn of_set(
         violations.add(field, format!("has {found} {plural}; {needed}"));
         return;
     }
-    let refused = values.iter().enumerate().filter(|&(_, &value)| !accepted.contains(value));
-    for (refusals, (index, &value)) in refused.enumerate() {
-        if refusals == REFUSED_MAX {
-            violations.add_more(&field, format!("more {plural} out of range are not listed"));
-            return;
-        }
-        violations.add(element_path(&field, index), accepted.refusal(value));
-    }
+    elements(&field, values, (*accepted, plural), violations);
 }
 
 /// Checks that the observables of an identification tell their noise.
@@ -79,15 +71,9 @@ pub(super) fn observables_of_job(
         return;
     }
     for number in data.searched_sets() {
-        let refusals =
-            measured.members().filter_map(|one| Some((one, unusable(data, number, one)?)));
-        let Some((observable, refusal)) = refusals
-            .into_iter()
-            .next()
-            .or_else(|| Some((measured.members().last()?, noiseless(data, number)?)))
-        else {
-            continue;
-        };
+        let of_one = measured.members().find_map(|one| Some((one, unusable(data, number, one)?)));
+        let of_all = || Some((measured.members().last()?, noiseless(data, number)?));
+        let Some((observable, refusal)) = of_one.or_else(of_all) else { continue };
         let name = data.names().nth(number);
         let of = name.map_or_else(String::new, |name| format!("of the group {name:?}: "));
         let field = match origin {
@@ -127,10 +113,10 @@ fn noiseless(data: &Data, number: usize) -> Option<String> {
 
 /// Checks that either all groups have an observable, or none has.
 fn has_all_or_none(data: &Data, observable: Observable, violations: &mut Violations) -> bool {
-    let has = |group: &&crate::data::Group| group.observables[observable].is_some();
+    let has = |group: &Group| group.observables[observable].is_some();
     let without = data.groups().iter().find(|group| !has(group));
     match without {
-        Some(group) if data.groups().iter().any(|group| has(&group)) => {
+        Some(group) if data.groups().iter().any(has) => {
             let plural = observable.row().plural;
             violations.add(
                 entry_path("data.groups", &group.name),

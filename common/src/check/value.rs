@@ -1,6 +1,7 @@
 //! Rules on one value by itself.
 
 use crate::accepted::{Interval, WholeRange};
+use crate::field_path::element_path;
 use crate::plausible::PlausibleRange;
 use crate::violations::Violations;
 
@@ -31,6 +32,26 @@ pub fn quantity(
         (false, Some(question)) => format!("{}: {question}", accepted.refusal(value)),
     };
     violations.add(field, refusal);
+}
+
+/// Maximum number of elements of a list that are refused individually.
+pub(super) const REFUSED_MAX: usize = 10;
+
+/// Records the elements of a list that are outside `accepted`; `plural` is a word for them.
+pub(super) fn elements(
+    field: &str,
+    values: &[f64],
+    (accepted, plural): (Interval, &str),
+    violations: &mut Violations,
+) {
+    let refused = values.iter().enumerate().filter(|&(_, &value)| !accepted.contains(value));
+    for (refusals, (index, &value)) in refused.enumerate() {
+        if refusals == REFUSED_MAX {
+            violations.add_more(field, format!("more {plural} out of range are not listed"));
+            return;
+        }
+        violations.add(element_path(field, index), accepted.refusal(value));
+    }
 }
 
 /// Records a whole number outside `accepted`, unless `field` is known to be wrong.

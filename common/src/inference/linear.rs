@@ -23,8 +23,8 @@ pub(super) struct Linear {
     left: Vec<MomentVector>,
     /// An orthonormal basis of the null space.
     pub(super) undetermined: Vec<Vec<f64>>,
-    /// Of the least χ² with other observables: the same of the Jacobian in standard errors, by which it
-    /// moves.
+    /// The same directions for the Jacobian in standard errors, with its weights. Errors move the point of
+    /// least χ² along these, if there are more moments than two; `None` where χ² is not the cost.
     weighted: Option<(Box<Self>, MomentWeights)>,
 }
 

@@ -73,7 +73,11 @@ pub fn data_noise(data: &Data, set: usize) -> Option<DataNoise> {
         return of_normal_law(measured, data.moments(set), count?);
     }
     let velocities = data.set(set)?;
-    let covariance = statistics::covariance_of_moments(&velocities)?;
+    // Less work where nothing else is compared.
+    let covariance = match velocities.observables.set().is_empty() {
+        true => of_velocities(statistics::covariance_of_logarithms(&velocities)?),
+        false => statistics::covariance_of_moments(&velocities)?,
+    };
     Some(DataNoise { covariance, freedom: velocities.parts() as u64 - 1 })
 }
 

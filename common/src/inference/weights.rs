@@ -1,7 +1,8 @@
 //! Weights of the compared moments by the noise of the data: the cost χ² = rᵀ C⁻¹ r.
 //!
-//! Of other observables than the velocity only the mean is compared. Their scatter is also that of how
-//! each receiver is coupled, which the model does not have; it is a part of the error of the mean.
+//! For an observable other than the velocity only the mean is compared. Its values also scatter because
+//! receivers are coupled differently, which the model does not contain; that scatter counts as an error of
+//! the mean.
 
 use super::noise::{PARTS_MIN, data_noise, normal_law_noise};
 use crate::data::Data;

@@ -62,8 +62,8 @@ fn estimate(
 impl Data {
     /// Returns the moments of a set, by its number, in which a model is compared with it.
     pub fn compared(&self, set: usize) -> ComparedMoments {
-        let measured = self.set(set).as_ref().map(measured_observables).unwrap_or_default();
-        let observables = measured.map(|found| found.map(|found| found.mean));
+        let measured = self.set(set).map(|set| set.observables).unwrap_or_default();
+        let observables = measured.map(|values| mean_of(values?));
         ComparedMoments { velocities: self.moments(set), observables }
     }
 }
@@ -86,10 +86,7 @@ pub fn measured_observables(set: &VelocitySet<'_>) -> ObservableEstimates {
 /// [`super::covariance_of_logarithms`] is.
 pub fn covariance_of_moments(set: &VelocitySet<'_>) -> Option<MomentMatrix> {
     let logarithms = influences_on_logarithms(set)?;
-    let measured = set.observables.map(|values| {
-        let values = values?;
-        mean(values.iter().copied()).map(|(_, mean)| (values, mean))
-    });
+    let measured = set.observables.map(|values| Some((values?, mean_of(values?)?)));
     let influences = logarithms.enumerate().map(|(index, of_velocity)| {
         moment_vector(of_velocity, |observable| match measured[observable] {
             Some((values, mean)) => (values[index] - mean) / mean.abs(),
@@ -104,6 +101,10 @@ fn successes<'a>(
     values: &'a [f64],
 ) -> impl Iterator<Item = f64> + Clone + 'a {
     outcomes.iter().zip(values).filter(|(outcome, _)| outcome.is_ok()).map(|(_, value)| *value)
+}
+
+fn mean_of(values: &[f64]) -> Option<f64> {
+    mean(values.iter().copied()).map(|(_, mean)| mean)
 }
 
 /// Returns number and mean of these values, unless there are none.

@@ -75,7 +75,7 @@ fn hosts(hosts: &[String]) -> String {
     }
 }
 
-fn shown_observables(observables: &ObservedValues) -> String {
+fn describe_observables(observables: &ObservedValues) -> String {
     let present = observables.iter().filter(|(_, value)| **value != 0.0);
     present.map(|(one, value)| format!(", {} {value:?}", one.name())).collect()
 }
@@ -87,7 +87,7 @@ pub(crate) fn describe_answer(solved: RealizationResult) -> String {
             "{velocity} m/s (bits {:016x}, estimated error {:?}{})",
             encode(solved.outcome).1.to_bits(),
             solved.estimated_error,
-            shown_observables(&solved.observables)
+            describe_observables(&solved.observables)
         ),
         Err(kind) => kind.name().to_owned(),
     }

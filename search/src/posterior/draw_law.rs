@@ -22,6 +22,8 @@ const VARIANCE_MIN: f64 = 1e-12;
 pub(super) struct DrawLaw {
     mean: Vec<f64>,
     factor: Cholesky,
+    /// Logarithm of the largest density of the normal law.
+    log_peak: f64,
 }
 
 impl DrawLaw {
@@ -41,7 +43,8 @@ impl DrawLaw {
                 return None;
             }
         }
-        Some(Self { mean, factor })
+        let log_peak = -0.5 * dimension as f64 * libm::log(TAU) - factor.half_log_determinant();
+        Some(Self { mean, factor, log_peak })
     }
 
     /// Returns the coordinates of point number `index`, by independent numbers that are uniform from 0
@@ -59,8 +62,7 @@ impl DrawLaw {
     pub(super) fn log_density(&self, at: &[f64]) -> f64 {
         let off: Vec<f64> = at.iter().zip(&self.mean).map(|(at, mean)| at - mean).collect();
         let white = self.factor.solve_lower(&off);
-        let constant = 0.5 * at.len() as f64 * libm::log(TAU) + self.factor.half_log_determinant();
-        let normal = libm::exp(-0.5 * dot(&white, &white) - constant);
+        let normal = libm::exp(self.log_peak - 0.5 * dot(&white, &white));
         let of_prior = 1.0 / OF_PRIOR as f64;
         libm::log(of_prior + (1.0 - of_prior) * normal)
     }

@@ -40,6 +40,8 @@ const STEP: f64 = 1e-5;
 /// How often a population is drawn anew about the weights of the one before, if other observables were
 /// measured.
 const LAWS: usize = 2;
+/// Points of the populations before the last one: enough to tell where the weights are.
+const LAW_POINTS: u64 = 1 << 14;
 /// Power of the likelihood of widened populations.
 const WIDENED: f64 = 0.5;
 
@@ -121,15 +123,13 @@ impl PosteriorProblem {
     /// Draws the population of an interpolated model from `count` Sobol' points; `number` chooses
     /// among independent ones.
     pub(super) fn population(&self, model: &Surrogate, count: u64, number: u64) -> Population {
-        let mut population = self.drawn_by(None, model, count, number);
-        if self.likelihood.observables().is_empty() || self.drawn_parameters() == 0 {
-            return population;
+        let by_prior = self.likelihood.observables().is_empty() || self.drawn_parameters() == 0;
+        let mut law = None;
+        for _ in 0..if by_prior { 0 } else { LAWS } {
+            let scouts = self.drawn_by(law.as_ref(), model, count.min(LAW_POINTS), number);
+            law = self.draw_law(&scouts).or(law);
         }
-        for _ in 0..LAWS {
-            let Some(law) = self.draw_law(&population) else { break };
-            population = self.drawn_by(Some(&law), model, count, number);
-        }
-        population
+        self.drawn_by(law.as_ref(), model, count, number)
     }
 
     /// Draws a population whose parameters other than the pivots come from a law, or from the prior.
