@@ -45,6 +45,10 @@ impl CellNumber {
         }
         let cell = text;
         let text = half_width(bare(text.trim()));
+        // Most cells of text end here: the search for a unit takes much longer.
+        if !text.contains(|c: char| c.is_ascii_digit()) {
+            return None;
+        }
         let (value, error) = match BEFORE_ERROR.iter().find_map(|mark| text.split_once(mark)) {
             Some((value, error)) => (value.trim(), Some(error.trim())),
             None => (text.trim(), None),
