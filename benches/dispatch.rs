@@ -27,13 +27,13 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::Ensemble;
 use osteon_files::job_file;
 use osteon_files::report::ResultFile;
-use osteon_proto::connection::{connect, jobs_client};
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{FetchRequest, JobState, SubmitRequest, WatchRequest};
 use osteon_proto::{history, specification};
 use osteon_solver::{Solver, Workspace};
+use osteon_transport::connection::{connect, jobs_client};
+use osteon_transport::endpoint::Endpoint;
 use tonic::transport::Channel;
 
 #[expect(dead_code, reason = "each benchmark uses a part of it")]

@@ -23,11 +23,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Context as _, Result, bail};
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_files::job_file;
-use osteon_proto::connection::{connect, jobs_client};
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::specification;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{CancelRequest, JobState, SubmitRequest, WatchRequest};
+use osteon_transport::connection::{connect, jobs_client};
+use osteon_transport::endpoint::Endpoint;
 use tokio::task::JoinSet;
 use tonic::transport::Channel;
 

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use osteon_proto::endpoint::Endpoint;
+use osteon_transport::endpoint::Endpoint;
 
 use crate::program;
 use crate::wings::{ClusterWing, JobWing, ReportOption, RunPageOption};

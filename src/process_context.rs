@@ -4,9 +4,9 @@
 use anyhow::anyhow;
 use osteon_client::client::Remote;
 use osteon_client::environment::Environment;
-use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint::Endpoint;
 use osteon_solver::Isa;
+use osteon_transport::credentials::CredentialFiles;
+use osteon_transport::endpoint::Endpoint;
 
 use crate::arguments::{ClientArguments, CredentialArguments};
 use crate::exit_status::CommandFailure;

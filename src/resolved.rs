@@ -7,8 +7,8 @@ use std::time::Duration;
 use osteon_client::client::Remote;
 use osteon_client::environment::Unused;
 use osteon_common::job::JobKind;
-use osteon_proto::credentials::{CredentialFiles, Credentials};
 use osteon_solver::Isa;
+use osteon_transport::credentials::{CredentialFiles, Credentials};
 use osteon_worker::WorkerConfig;
 
 use crate::arguments::{

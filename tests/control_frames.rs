@@ -22,10 +22,10 @@ mod support;
 use std::sync::Arc;
 use std::time::Instant;
 
-use osteon_proto::connection::{Connection, connect_with, jobs_client};
-use osteon_proto::credentials::{ALPN, CredentialFiles, Credentials, roots};
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::ListRequest;
+use osteon_transport::connection::{Connection, connect_with, jobs_client};
+use osteon_transport::credentials::{ALPN, CredentialFiles, Credentials, roots};
+use osteon_transport::endpoint::Endpoint;
 use secure::Secure;
 use service::Service;
 use support::{DEADLINE, Scratch};

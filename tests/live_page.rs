@@ -29,9 +29,9 @@ mod support;
 use std::net::TcpListener;
 
 use osteon_common::job::JobKind;
-use osteon_proto::connection::{connect, workers_client};
 use osteon_proto::v1::attach_request::Message;
 use osteon_proto::v1::{AttachRequest, SubmitRequest, WorkerHello};
+use osteon_transport::connection::{connect, workers_client};
 use page::{Page, Updates};
 use serde_json::Value;
 use service::Service;
@@ -473,7 +473,7 @@ mod tls {
 
     /// Gets the list of jobs with a token.
     pub(crate) async fn get(address: &str, ca: &Path, token: &str) -> String {
-        let roots = osteon_proto::credentials::roots(ca).unwrap();
+        let roots = osteon_transport::credentials::roots(ca).unwrap();
         let provider = Arc::new(ring::default_provider());
         let mut config = ClientConfig::builder_with_provider(provider)
             .with_safe_default_protocol_versions()

@@ -15,10 +15,10 @@ use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::Duration;
 
-use osteon_proto::connection::{Connection, connect_with};
-use osteon_proto::credentials::{CredentialFiles, Credentials};
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::FILE_DESCRIPTOR_SET;
+use osteon_transport::connection::{Connection, connect_with};
+use osteon_transport::credentials::{CredentialFiles, Credentials};
+use osteon_transport::endpoint::Endpoint;
 use prost::Message as _;
 use prost_types::FileDescriptorSet;
 use secure::{Made, ROLES, Secure, certificate, mode, serve, set_up};

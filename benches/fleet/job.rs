@@ -6,12 +6,12 @@ use std::time::Duration;
 use anyhow::{Context as _, Result, bail};
 use osteon_common::job::JobSpecification;
 use osteon_files::report::ResultFile;
-use osteon_proto::connection::{connect, jobs_client};
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{FetchRequest, JobState, JobStatus, SubmitRequest, WatchRequest};
 use osteon_proto::{history, specification};
+use osteon_transport::connection::{connect, jobs_client};
+use osteon_transport::endpoint::Endpoint;
 use tokio::time::sleep;
 use tonic::transport::Channel;
 

@@ -13,7 +13,7 @@ use osteon_coordinator::store::Store;
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::store::sqlite::{LostJobs, SqliteStore};
 use osteon_coordinator::{Config, Coordinator, ListenAddress, Listener};
-use osteon_proto::endpoint::Endpoint;
+use osteon_transport::endpoint::Endpoint;
 use tempfile::TempDir;
 
 use crate::embedded::workers::Workers;

@@ -5,8 +5,8 @@ use std::ffi::OsString;
 use std::fmt;
 use std::path::PathBuf;
 
-use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint::{Endpoint, EndpointError};
+use osteon_transport::credentials::CredentialFiles;
+use osteon_transport::endpoint::{Endpoint, EndpointError};
 use thiserror::Error;
 
 /// The variable with the address of the coordinator.

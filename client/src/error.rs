@@ -1,10 +1,10 @@
 //! Why a request to a coordinator failed. Every error names the coordinator.
 
 use osteon_common::violations::Violations;
-use osteon_proto::connection::ConnectError;
-use osteon_proto::credentials::CredentialsError;
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::malformed::Malformed;
+use osteon_transport::connection::ConnectError;
+use osteon_transport::credentials::CredentialsError;
+use osteon_transport::endpoint::Endpoint;
 use thiserror::Error;
 use tonic::Code;
 

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_proto::connection::{self, ConnectError};
-use osteon_proto::credentials::CredentialFiles;
 use osteon_proto::malformed::Malformed;
-use osteon_proto::patience::Patience;
 use osteon_proto::v1::backup_response::Part;
 use osteon_proto::v1::{
     self, BackupEnd, ExplainResponse, JobSnapshot, ListWorkersResponse, WorkerSnapshot,
 };
+use osteon_transport::connection::{self, ConnectError};
+use osteon_transport::credentials::CredentialFiles;
+use osteon_transport::patience::Patience;
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;

@@ -5,11 +5,11 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
-use osteon_proto::connection::ConnectError;
-use osteon_proto::endpoint::Endpoint;
-use osteon_proto::patience::Patience;
 use osteon_proto::status::{self, Resource};
-use osteon_proto::tls_failure::TlsFailure;
+use osteon_transport::connection::ConnectError;
+use osteon_transport::endpoint::Endpoint;
+use osteon_transport::patience::Patience;
+use osteon_transport::tls_failure::TlsFailure;
 use tonic::{Code, Response, Status};
 
 use crate::environment::Unused;

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint::Endpoint;
+use osteon_transport::credentials::CredentialFiles;
+use osteon_transport::endpoint::Endpoint;
 
 use crate::environment::Unused;
 use crate::error::ANSWER_S_MAX;

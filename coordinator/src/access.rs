@@ -7,7 +7,7 @@ pub(crate) mod message_body;
 pub mod tls;
 pub mod tokens;
 
-use osteon_proto::token::Token;
+use osteon_transport::token::Token;
 use thiserror::Error;
 
 use crate::access::tokens::{Role, Tokens};

@@ -15,10 +15,10 @@ use osteon_common::limits::{
 };
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
-use osteon_proto::connection::{connect, jobs_client, workers_client};
 use osteon_proto::specification;
 use osteon_proto::v1::attach_request::Message;
 use osteon_proto::v1::{AttachRequest, ListRequest, SubmitRequest, SubmitResponse, WorkerHello};
+use osteon_transport::connection::{connect, jobs_client, workers_client};
 use prost::Message as _;
 use tonic::client::Grpc;
 use tonic::codegen::http::uri::PathAndQuery;

@@ -11,7 +11,7 @@ use osteon_coordinator::access::{self, Presented, Requirement};
 use osteon_coordinator::core::ids::JobId;
 use osteon_coordinator::{ListenAddress, Tokens};
 use osteon_fuzz::{bounded, bytes, damaged, damaged_text, properties};
-use osteon_proto::token::TokenHash;
+use osteon_transport::token::TokenHash;
 
 fn read(path: &Path, bytes: &[u8]) -> Result<Tokens, TokensError> {
     fs::write(path, bytes).unwrap();

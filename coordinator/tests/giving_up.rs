@@ -15,13 +15,13 @@ use osteon_common::limits::{
 };
 use osteon_coordinator::store::memory::MemoryStore;
 use osteon_coordinator::{Config, Coordinator, Listener, start};
-use osteon_proto::connection::{connect, jobs_client, workers_client};
 use osteon_proto::v1::attach_request::Message as Sent;
 use osteon_proto::v1::attach_response::Message as Received;
 use osteon_proto::v1::{
     AttachRequest, FetchRequest, FetchResponse, SubmitRequest, WatchRequest, WorkerHello,
 };
 use osteon_proto::{announced, batch, specification};
+use osteon_transport::connection::{connect, jobs_client, workers_client};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;

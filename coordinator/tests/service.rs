@@ -20,8 +20,6 @@ use osteon_coordinator::{ComponentFailure, Config, Coordinator, Listener, start}
 use osteon_files::report::ResultFile;
 use osteon_proto::announced::Received;
 use osteon_proto::choice::JOB_STATUS;
-use osteon_proto::connection::{connect, jobs_client, workers_client};
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::v1::attach_request::Message as Request;
 use osteon_proto::v1::attach_response::Message as Response;
 use osteon_proto::v1::fetch_response::Part;
@@ -32,6 +30,8 @@ use osteon_proto::v1::{
 };
 use osteon_proto::{batch, realizations, specification, status};
 use osteon_search::Summary;
+use osteon_transport::connection::{connect, jobs_client, workers_client};
+use osteon_transport::endpoint::Endpoint;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Channel;

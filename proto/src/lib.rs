@@ -1,5 +1,5 @@
 //! Protocol buffers of `osteon.v1`, the one place where messages are converted to and from
-//! `osteon-common` types; endpoints, credentials and connections.
+//! `osteon-common` types.
 //!
 //! Messages from a peer are never trusted. A client's message is checked field by field, and all its
 //! [violations](osteon_common::violations::Violations) are reported at once. A message from a coordinator or
@@ -10,12 +10,7 @@
 pub mod announced;
 pub mod batch;
 pub mod choice;
-pub mod connection;
-pub mod credential_file;
-pub mod credentials;
 pub mod draws;
-pub mod endpoint;
-mod error_causes;
 pub mod evaluation;
 mod fields;
 pub mod history;
@@ -23,8 +18,6 @@ pub mod identity;
 pub mod malformed;
 pub mod observed;
 pub mod parameter_values;
-pub mod patience;
-mod pipe;
 mod posterior_settings;
 pub mod realizations;
 pub mod setup;
@@ -32,8 +25,6 @@ pub mod spans;
 pub mod specification;
 pub mod status;
 pub mod timestamp;
-pub mod tls_failure;
-pub mod token;
 
 /// The generated messages, clients and servers of package `osteon.v1`.
 #[expect(

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint::Endpoint;
+use osteon_transport::credentials::CredentialFiles;
+use osteon_transport::endpoint::Endpoint;
 
 use super::shell::{absolute, quoted, without_controls};
 use super::{SlurmError, directives};

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use osteon_coordinator::ListenAddress;
-use osteon_proto::endpoint::Endpoint;
+use osteon_transport::endpoint::Endpoint;
 
 use super::{CredentialArguments, age, seconds};
 use crate::wings::PageOptions;

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::{Context as _, anyhow};
 use osteon_common::visible;
-use osteon_proto::credential_file;
-use osteon_proto::endpoint;
+use osteon_transport::credential_file;
+use osteon_transport::endpoint;
 use time::OffsetDateTime;
 use zeroize::Zeroizing;
 

@@ -2,7 +2,7 @@
 
 use anyhow::anyhow;
 use osteon_coordinator::access::tokens::{self, Role};
-use osteon_proto::token::Token;
+use osteon_transport::token::Token;
 use zeroize::Zeroizing;
 
 use crate::arguments::TokenArguments;

@@ -2,7 +2,7 @@
 
 use anyhow::anyhow;
 use osteon_client::environment::Unused;
-use osteon_proto::credentials::{CredentialFiles, Credentials, CredentialsError};
+use osteon_transport::credentials::{CredentialFiles, Credentials, CredentialsError};
 use osteon_worker::{WorkerConfig, WorkerError};
 use tonic::Code;
 

@@ -6,11 +6,11 @@ mod resolved;
 
 use osteon_client::results_directory::ResultsDirectory;
 use osteon_files::job_file;
-use osteon_proto::credentials::Credentials;
-use osteon_proto::endpoint::Endpoint;
 use osteon_slurm::follow::{LookError, ScalingPlan};
 use osteon_slurm::job_script::JobScript;
 use osteon_slurm::worker_script::WorkerScript;
+use osteon_transport::credentials::Credentials;
+use osteon_transport::endpoint::Endpoint;
 
 use self::resolved::SlurmTask;
 use super::{Performance, ResolvedWing, WingCommand};

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 
 use osteon_common::job::JobKind;
 use osteon_common::limits::MESSAGE_BYTES_MAX;
-use osteon_proto::connection::connect;
 use osteon_proto::v1::jobs_client::JobsClient;
 use osteon_proto::v1::{CancelRequest, JobSnapshot, SubmitRequest, WatchRequest};
+use osteon_transport::connection::connect;
 use tonic::Code;
 
 use crate::api::{Api, client_of, progress, specification};

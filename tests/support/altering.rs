@@ -8,11 +8,11 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
-use osteon_proto::connection::{connect, workers_client};
 use osteon_proto::v1::workers_server::{Workers, WorkersServer};
 use osteon_proto::v1::{
     AttachRequest, AttachResponse, BatchResult, attach_request, attach_response,
 };
+use osteon_transport::connection::{connect, workers_client};
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
 use tokio_stream::wrappers::{ReceiverStream, TcpListenerStream};

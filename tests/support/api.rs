@@ -6,7 +6,6 @@ use std::time::Duration;
 use osteon_common::job::JobKind;
 use osteon_files::job_file;
 use osteon_files::report::ResultFile;
-use osteon_proto::connection::{connect, jobs_client};
 use osteon_proto::specification;
 use osteon_proto::v1::fetch_response::Part;
 use osteon_proto::v1::jobs_client::JobsClient;
@@ -14,6 +13,7 @@ use osteon_proto::v1::{
     FetchRequest, GetRequest, JobSnapshot, JobSpecification, JobState, ListRequest,
     ListWorkersRequest, SubmitRequest,
 };
+use osteon_transport::connection::{connect, jobs_client};
 use tokio::runtime::Runtime;
 use tonic::transport::Channel;
 use tonic::{Code, Status};

@@ -199,8 +199,8 @@ mod tests {
     use osteon_coordinator::store::memory::MemoryStore;
     use osteon_coordinator::{Config, Listener};
     use osteon_files::job_file;
-    use osteon_proto::credentials::CredentialFiles;
-    use osteon_proto::endpoint::Endpoint;
+    use osteon_transport::credentials::CredentialFiles;
+    use osteon_transport::endpoint::Endpoint;
     use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
     use tokio::net::{UnixListener, UnixStream};
     use tokio::sync::watch;

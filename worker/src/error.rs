@@ -5,10 +5,10 @@ use std::fmt;
 use crate::self_test::KNOWN_DIGEST;
 use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::parameters::Point;
-use osteon_proto::endpoint::Endpoint;
 use osteon_proto::identity::NoRandomness;
 use osteon_proto::malformed::Malformed;
-use osteon_proto::tls_failure::TlsFailure;
+use osteon_transport::endpoint::Endpoint;
+use osteon_transport::tls_failure::TlsFailure;
 use thiserror::Error;
 use tonic::Code;
 

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use osteon_proto::credential_file::{self, CredentialError};
-use osteon_proto::credentials::{self, ALPN};
-use osteon_proto::tls_failure::TlsFailure;
+use osteon_transport::credential_file::{self, CredentialError};
+use osteon_transport::credentials::{self, ALPN};
+use osteon_transport::tls_failure::TlsFailure;
 use thiserror::Error;
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::rustls::client::danger::HandshakeSignatureValid;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use osteon_common::limits::{NAME_BYTES_MAX, TOKENS_MAX};
 use osteon_common::visible;
-use osteon_proto::credential_file::{self, CredentialError};
-use osteon_proto::token::{PREFIX, Token, TokenHash};
+use osteon_transport::credential_file::{self, CredentialError};
+use osteon_transport::token::{PREFIX, Token, TokenHash};
 use thiserror::Error;
 
 /// This many consecutive hexadecimal digits may be a secret: half of those in a token.

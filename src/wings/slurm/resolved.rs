@@ -6,12 +6,12 @@ use std::time::Duration;
 use anyhow::{Context as _, anyhow};
 use osteon_client::client::Remote;
 use osteon_common::job::JobKind;
-use osteon_proto::credentials::CredentialFiles;
-use osteon_proto::endpoint::Endpoint;
 use osteon_slurm::follow::ScalingPlan;
 use osteon_slurm::job_script::JobScript;
 use osteon_slurm::scaling::ScalingPolicy;
 use osteon_slurm::worker_script::{MARGIN, WorkerScript};
+use osteon_transport::credentials::CredentialFiles;
+use osteon_transport::endpoint::Endpoint;
 
 use super::arguments::{
     AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,

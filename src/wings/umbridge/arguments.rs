@@ -3,7 +3,7 @@
 use std::net::IpAddr;
 
 use clap::Args;
-use osteon_proto::endpoint::Endpoint;
+use osteon_transport::endpoint::Endpoint;
 
 use crate::arguments::{CredentialArguments, JobFileArguments};
 use crate::wings::host_name::host_name;

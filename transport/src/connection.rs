@@ -21,8 +21,8 @@ use crate::endpoint::{Endpoint, host};
 use crate::error_causes::innermost;
 use crate::patience::Patience;
 use crate::tls_failure::TlsFailure;
-use crate::v1::jobs_client::JobsClient;
-use crate::v1::workers_client::WorkersClient;
+use osteon_proto::v1::jobs_client::JobsClient;
+use osteon_proto::v1::workers_client::WorkersClient;
 
 /// Interval of keepalive probes on a silent connection, s.
 const KEEPALIVE_INTERVAL_S: u64 = 5;

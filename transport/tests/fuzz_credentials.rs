@@ -7,9 +7,9 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 
 use osteon_fuzz::{bounded, bytes, damaged, damaged_text, properties, texts};
-use osteon_proto::credential_file::{self, CredentialError};
-use osteon_proto::endpoint::Endpoint;
-use osteon_proto::token::{Token, TokenHash};
+use osteon_transport::credential_file::{self, CredentialError};
+use osteon_transport::endpoint::Endpoint;
+use osteon_transport::token::{Token, TokenHash};
 
 fn check_text(text: &str) {
     if let Ok(token) = bounded(text.len(), || Token::parse(text)) {

@@ -7,8 +7,8 @@ use std::fs::{self, File, Permissions};
 use std::os::unix::fs::{FileExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 
-use osteon_proto::credential_file;
-use osteon_proto::token::{PREFIX, Token};
+use osteon_transport::credential_file;
+use osteon_transport::token::{PREFIX, Token};
 
 /// Length of the end of a secret that is looked for: the allocator overwrites the beginning of freed memory by
 /// itself.

@@ -6,7 +6,7 @@ use std::fmt;
 use thiserror::Error;
 use zeroize::Zeroizing;
 
-use crate::identity::{self, NoRandomness};
+use osteon_proto::identity::{self, NoRandomness};
 
 /// Prefix of every token, by which scanners for leaked secrets can find it.
 pub const PREFIX: &str = "osteon_";
