@@ -13,7 +13,7 @@ use osteon_report::{JobTables, ReportedRun, TableError};
 use crate::result_files::{self, RESULT, remove_if_there};
 use crate::results_directory::{
     CASE, COMPARISON, HISTORY, JOB, POSTERIOR, REALIZATIONS, job_of, make_directory,
-    read_named_file, result_of, result_path,
+    read_named_file, read_result, result_path,
 };
 use crate::run_error::RunError;
 use crate::simulation_directory::TRACES;
@@ -46,10 +46,10 @@ pub fn read(directory: &Path) -> Result<ReportedRun, RunError> {
             visible::path(directory)
         ))
     };
-    if text_of(CASE)?.is_some() && text_of(JOB)?.is_none() {
+    if directory.join(CASE).exists() && !directory.join(JOB).exists() {
         return simulation(directory, name, &text)?.map_err(damaged);
     }
-    let result = result_of(directory).map_err(RunError::BadInput)?;
+    let result = read_result(directory, &text).map_err(RunError::BadInput)?;
     let kind = result.kind();
     let specification = job_of(directory, kind).map_err(RunError::BadInput)?;
     let tables = JobTables {

@@ -29,14 +29,14 @@ use crate::run_error::RunError;
 pub const JOB: &str = "job.toml";
 /// File of the case to which a directory belongs.
 pub const CASE: &str = "case.toml";
-/// A table of the results.
+/// Table of the evaluated points.
 pub const HISTORY: &str = "history.csv";
-/// A table of the results.
+/// Table of the realizations at the best point.
 pub const REALIZATIONS: &str = "realizations.csv";
-/// A table of the results.
+/// Table of the posterior's draws.
 pub const POSTERIOR: &str = "posterior.csv";
 const GROUPS: &str = "groups.csv";
-/// A table of the results.
+/// Table of the points at which both solver methods were compared.
 pub const COMPARISON: &str = "comparison.csv";
 const LOCK: &str = ".lock";
 const REQUEST: &str = ".request";
@@ -351,7 +351,7 @@ pub fn result_path(directory: &Path) -> String {
 }
 
 /// Parses a result; the error names the file that must be replaced.
-fn read_result(directory: &Path, text: &str) -> anyhow::Result<ResultFile> {
+pub(crate) fn read_result(directory: &Path, text: &str) -> anyhow::Result<ResultFile> {
     ResultFile::from_json(text).map_err(|error| {
         anyhow!(
             "{} is not the result of a job: {error}; remove the file and run the job again, or choose \

@@ -173,14 +173,14 @@ impl Data {
     }
 
     /// Returns the number of sets that can be searched.
-    pub fn searched(&self) -> usize {
-        self.searched_sets().count()
+    pub fn searchable_count(&self) -> usize {
+        self.searchable_sets().count()
     }
 
     /// Returns the numbers of the sets that can be searched.
-    pub fn searched_sets(&self) -> impl Iterator<Item = usize> {
-        let unsearched = |set: &usize| self.groups().get(*set).and_then(Group::no_variation);
-        (0..self.sets()).filter(move |set| unsearched(set).is_none())
+    pub fn searchable_sets(&self) -> impl Iterator<Item = usize> {
+        let no_variation = |set: &usize| self.groups().get(*set).and_then(Group::no_variation);
+        (0..self.sets()).filter(move |set| no_variation(set).is_none())
     }
 
     /// Returns the quantities of the setup that are known of a set, by its number.
@@ -223,7 +223,7 @@ impl Data {
 
     /// Returns the observables that were measured.
     pub fn observables(&self) -> ObservableSet {
-        self.set(0).map(|set| set.observables.set()).unwrap_or_default()
+        self.set(0).map(|set| set.observables.which()).unwrap_or_default()
     }
 
     /// Returns the instrument's own standard deviation, m/s; 0 if it is not known.
@@ -248,7 +248,7 @@ impl<'a> VelocitySet<'a> {
     }
 
     /// Returns the number of independent parts: of subjects, or else of velocities.
-    pub fn parts(&self) -> usize {
+    pub fn independent_count(&self) -> usize {
         let last = |subjects: &[u32]| subjects.iter().max().map_or(0, |&last| last as usize + 1);
         self.subjects.map_or(self.velocities.len(), last)
     }
@@ -274,7 +274,10 @@ mod tests {
         };
         assert_eq!((data.subjects(0), data.subjects(1)), (None, Some(&[0, 1][..])));
         assert_eq!((data.count(0), data.count(2), data.repeatability()), (Some(2), None, 5.0));
-        assert_eq!(data.set(1).map(|set| (set.parts(), set.repeatability)), Some((2, 5.0)));
+        assert_eq!(
+            data.set(1).map(|set| (set.independent_count(), set.repeatability)),
+            Some((2, 5.0))
+        );
         let mut moments = Data::from_moments(3900.0, 0.03);
         assert_eq!((moments.count(0), moments.set(0)), (None, None));
         let (mean, coefficient_of_variation) = (3900.0, 0.03);

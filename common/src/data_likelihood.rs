@@ -95,7 +95,7 @@ impl DataLikelihood {
         (repeatability, has_subjects): (f64, bool),
     ) -> Option<Self> {
         let scale = RobustScale::from_velocities(velocities);
-        let is_right = |velocity: &f64| scale.is_none_or(|scale| !scale.is_far(*velocity));
+        let is_right = |velocity: &f64| scale.is_none_or(|scale| !scale.is_outlying(*velocity));
         let right: Vec<f64> = velocities.iter().copied().filter(is_right).collect();
         let first = right.first().copied()?;
         let count = right.len() as f64;
@@ -104,16 +104,19 @@ impl DataLikelihood {
         let squares: f64 = right.iter().map(|v| (v - centre) * (v - centre)).sum();
         let deviation = (squares / count).sqrt();
         let all = || velocities.iter().copied().zip(subjects.iter().copied());
-        let is_far = |(velocity, _): &(f64, u32)| {
-            scale.is_some_and(|scale| Contamination::is_far(&scale, *velocity, has_subjects))
+        let is_outside = |(velocity, _): &(f64, u32)| {
+            scale.is_some_and(|scale| {
+                Contamination::is_outside_core(&scale, *velocity, has_subjects)
+            })
         };
-        let far: Vec<f64> = all().filter(is_far).map(|(velocity, _)| velocity).collect();
-        let subjects = Subjects::new(all().filter(|one| !is_far(one)), centre);
+        let outside: Vec<f64> = all().filter(is_outside).map(|(velocity, _)| velocity).collect();
+        let subjects = Subjects::new(all().filter(|one| !is_outside(one)), centre);
         let within = subjects.within_variance().map_or(deviation, |within| within.sqrt());
         let repeatability = with_rounding(repeatability, velocities, deviation.min(within));
         let subjects = if repeatability > 0.0 { subjects } else { subjects.without_repeats() };
-        let core = velocities.len() - far.len();
-        let contamination = scale.and_then(|scale| Contamination::new(&scale, core, &far, centre));
+        let core = velocities.len() - outside.len();
+        let contamination =
+            scale.and_then(|scale| Contamination::new(&scale, core, &outside, centre));
         let found = Self::from_subjects(centre, deviation, repeatability, subjects)?;
         Some(Self { contamination, ..found })
     }
@@ -159,10 +162,10 @@ impl DataLikelihood {
             let mean = libm::exp(mean + step[0]);
             let deviation = mean * libm::exp(variation + step[1]);
             let variance = deviation * deviation;
-            let far = self.contamination.as_ref().map_or(0.0, |contamination| {
+            let contaminated = self.contamination.as_ref().map_or(0.0, |contamination| {
                 contamination.log(mean - self.centre, variance + self.instrument)
             });
-            weight + far + self.subjects.log(mean - self.centre, variance, self.instrument)
+            weight + contaminated + self.subjects.log(mean - self.centre, variance, self.instrument)
         };
         log_of_sum(self.model_errors.iter().map(of))
     }

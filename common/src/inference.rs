@@ -83,7 +83,7 @@ pub fn inference(
             Some(found) => with_block(found.covariance, covariance),
             None => of_velocities(covariance),
         };
-        let freedom = data.set(set).map_or(1, |given| given.parts() as u64 - 1);
+        let freedom = data.set(set).map_or(1, |given| given.independent_count() as u64 - 1);
         noise.data = Some(DataNoise { covariance, freedom });
         ends = None;
     }

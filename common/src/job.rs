@@ -170,7 +170,7 @@ pub struct Omitted {
 fn has_known_noise(data: &Data) -> bool {
     let is_known = |covariance: MomentMatrix| covariance[0][0] > 0.0 && covariance[1][1] > 0.0;
     let found = |set| data_noise(data, set).is_some_and(|noise| is_known(noise.covariance));
-    data.searched_sets().all(found)
+    data.searchable_sets().all(found)
 }
 
 impl JobSpecification {
@@ -263,7 +263,7 @@ impl JobSpecification {
         let free = self.free().count() as u64;
         let measured = if self.search.sensitivities && self.is_searched() { free } else { 0 };
         let sampled = self.posterior.map_or(0, |posterior| posterior.max_evaluations);
-        let sets = self.data.as_ref().map_or(1, Data::searched) as u64;
+        let sets = self.data.as_ref().map_or(1, Data::searchable_count) as u64;
         let each = self.searched_max().saturating_add(measured).saturating_add(sampled);
         each.saturating_mul(sets)
     }

@@ -167,8 +167,8 @@ impl<T> PerObservable<Option<T>> {
         self.iter().filter_map(|(observable, value)| Some((observable, value.as_ref()?)))
     }
 
-    /// Returns which values there are.
-    pub fn set(&self) -> ObservableSet {
+    /// Returns which observables have a value.
+    pub fn which(&self) -> ObservableSet {
         PerObservable(self.0.each_ref().map(Option::is_some))
     }
 }
@@ -307,6 +307,6 @@ mod tests {
         let text = serde_json::to_string(&around).unwrap();
         assert_eq!(text, r#"{"mean":3900.0,"decay":4.5}"#);
         assert_eq!(serde_json::from_str::<Around>(&text).unwrap(), around);
-        assert_eq!(around.observables.set().titles(), "decay along the array");
+        assert_eq!(around.observables.which().titles(), "decay along the array");
     }
 }

@@ -12,11 +12,11 @@ const OF_QUARTILES: f64 = 1.349;
 const COUNT_MIN: usize = 5;
 /// Distance from the median, in robust standard deviations, beyond which a velocity among many is
 /// outlying.
-const FAR: f64 = 6.0;
+const OUTLYING: f64 = 6.0;
 /// The scale of few velocities is uncertain, so the distance is longer for them, by this divided by
 /// the square of their number. With it less than one of a hundred samples of a normal law has an
 /// outlying velocity, of whatever size it is; without it, one of twelve with five velocities.
-const FAR_OF_FEW: f64 = 50.0;
+const OUTLYING_OF_FEW: f64 = 50.0;
 
 /// Median and robust standard deviation of velocities, m/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +27,7 @@ pub struct RobustScale {
     /// divided by 1.349: among coarsely rounded velocities either may be near 0. Above 0.
     pub deviation: f64,
     /// Distance from the median, in these deviations, beyond which a velocity is outlying.
-    pub far: f64,
+    pub outlying_from: f64,
 }
 
 impl RobustScale {
@@ -47,8 +47,8 @@ impl RobustScale {
         let half = quantile(&distances, 0.5)?;
         let deviation = (OF_ABSOLUTE_DEVIATION * half).max(range / OF_QUARTILES);
         let count = velocities.len() as f64;
-        let far = FAR * (1.0 + FAR_OF_FEW / (count * count));
-        (deviation > 0.0).then_some(Self { median, deviation, far })
+        let outlying_from = OUTLYING * (1.0 + OUTLYING_OF_FEW / (count * count));
+        (deviation > 0.0).then_some(Self { median, deviation, outlying_from })
     }
 
     /// Returns by how many robust standard deviations a velocity lies above the median.
@@ -57,8 +57,8 @@ impl RobustScale {
     }
 
     /// Returns whether a velocity is outlying.
-    pub fn is_far(&self, velocity: f64) -> bool {
-        self.deviations(velocity).abs() > self.far
+    pub fn is_outlying(&self, velocity: f64) -> bool {
+        self.deviations(velocity).abs() > self.outlying_from
     }
 }
 
@@ -66,13 +66,15 @@ impl RobustScale {
 /// and than 6 + 300/n² for n of them; none for fewer than five.
 pub fn outliers(velocities: &[f64]) -> Vec<Outlier> {
     let Some(scale) = RobustScale::from_velocities(velocities) else { return Vec::new() };
-    let far = velocities.iter().enumerate().filter(|(_, velocity)| scale.is_far(**velocity));
-    far.map(|(index, &velocity)| Outlier {
-        index: index as u64,
-        velocity,
-        deviations: scale.deviations(velocity),
-    })
-    .collect()
+    let outlying =
+        velocities.iter().enumerate().filter(|(_, velocity)| scale.is_outlying(**velocity));
+    outlying
+        .map(|(index, &velocity)| Outlier {
+            index: index as u64,
+            velocity,
+            deviations: scale.deviations(velocity),
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -148,7 +148,7 @@ fn data(out: &mut String, data: &Data) -> fmt::Result {
 /// table.
 fn groups(out: &mut String, groups: &[Group]) -> fmt::Result {
     let has_more = |group: &Group| {
-        group.subjects.is_some() || !group.observables.set().is_empty() || !group.known.is_empty()
+        group.subjects.is_some() || !group.observables.which().is_empty() || !group.known.is_empty()
     };
     if groups.iter().any(has_more) {
         return groups.iter().try_for_each(|group| {

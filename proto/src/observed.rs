@@ -57,7 +57,7 @@ pub(crate) fn set_from_names(names: &[String]) -> Result<ObservableSet, Malforme
     for name in names {
         put(&mut found, name, ())?;
     }
-    Ok(found.set())
+    Ok(found.which())
 }
 
 fn put<T>(found: &mut PerObservable<Option<T>>, name: &str, value: T) -> Result<(), Malformed> {

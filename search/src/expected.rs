@@ -29,7 +29,7 @@ impl ExpectedEvaluations {
             return Self { fewest: 1, most: 1 };
         }
         let [fewest, most] = [0, 1].map(|end| {
-            let sets = specification.data.as_ref().map_or(1, Data::searched) as u64;
+            let sets = specification.data.as_ref().map_or(1, Data::searchable_count) as u64;
             let each = searched(specification, end).saturating_add(sampled(specification, end));
             each.saturating_mul(sets).min(specification.evaluations_max())
         });

@@ -153,7 +153,7 @@ impl Newton {
         let mut rule = [0.0; MOMENTS];
         rule[0] = libm::log(RULE_OF_THUMB);
         rule[1] = libm::log(RULE_OF_THUMB / 14.0_f64.sqrt());
-        let has_observables = !data.observables.set().is_empty();
+        let has_observables = !data.observables.which().is_empty();
         let mut newton = Self {
             settings,
             data,

@@ -113,7 +113,7 @@ fn no_subjects(set: &VelocitySet<'_>, subjects: &[u32], is_searched: bool) -> Op
     if numbered(subjects) != subjects {
         return Some("is not numbered from 0 in the order of first appearance".to_owned());
     }
-    (is_searched && set.parts() < SUBJECTS_MIN).then(|| {
+    (is_searched && set.independent_count() < SUBJECTS_MIN).then(|| {
         format!(
             "all {expected} velocities are of one subject; at least two subjects are needed to see by \
              how much they differ"

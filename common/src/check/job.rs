@@ -202,7 +202,7 @@ fn chi_square(specification: &JobSpecification, violations: &mut Violations) {
     }
     let Some(data) = specification.data.as_ref() else { return };
     let unknown = |set: &usize| MomentWeights::of_data(data, *set).is_none();
-    let Some(set) = data.searched_sets().find(unknown) else { return };
+    let Some(set) = data.searchable_sets().find(unknown) else { return };
     if data.has_only_moments() {
         violations.add(
             FIELD,

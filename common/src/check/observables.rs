@@ -70,7 +70,7 @@ pub(super) fn observables_of_job(
     if specification.kind != JobKind::Identification || measured.is_empty() {
         return;
     }
-    for number in data.searched_sets() {
+    for number in data.searchable_sets() {
         let of_one = measured.members().find_map(|one| Some((one, unusable(data, number, one)?)));
         let of_all = || Some((measured.members().last()?, noiseless(data, number)?));
         let Some((observable, refusal)) = of_one.or_else(of_all) else { continue };
@@ -89,7 +89,7 @@ pub(super) fn observables_of_job(
 fn unusable(data: &Data, number: usize, observable: Observable) -> Option<String> {
     let set = data.set(number)?;
     let ObservableRow { plural, unit, above_zero, .. } = observable.row();
-    let parts = set.parts();
+    let parts = set.independent_count();
     if parts < OBSERVED_PARTS_MIN {
         let of = if set.subjects.is_some() { "subjects" } else { "velocities" };
         return Some(format!(

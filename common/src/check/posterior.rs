@@ -81,7 +81,7 @@ fn all_draws(
     if ["posterior.draws", "data"].iter().any(|field| known_wrong(field, violations)) {
         return;
     }
-    let sets = specification.data.as_ref().map_or(1, Data::searched) as u64;
+    let sets = specification.data.as_ref().map_or(1, Data::searchable_count) as u64;
     let draws = settings.draws;
     if draws.saturating_mul(sets) > DRAWS_ALL_MAX {
         let message =

@@ -21,10 +21,10 @@ const RATES: usize = 24;
 /// of the core: a normal density there is ten times ε times the broad law's for ε = 0.015.
 const CORE: f64 = 3.0;
 /// Velocities outside the core that are this close together, in robust standard deviations, count as
-/// equal; for more different ones than [`FAR_MAX`], the distance is doubled until they fit.
+/// equal; for more different ones than [`OUTSIDE_MAX`], the distance is doubled until they fit.
 const CLOSE: f64 = 0.01;
 /// Maximum number of different velocities outside the core.
-const FAR_MAX: usize = 200;
+const OUTSIDE_MAX: usize = 200;
 /// Number of mixture densities, in units of the broad law's, that are multiplied before a logarithm is
 /// taken. Each is at least ε, so that the product does not underflow.
 const FACTORS: usize = 16;
@@ -33,14 +33,14 @@ const FACTORS: usize = 16;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Contamination {
     /// The velocities outside the core, in ascending order.
-    far: Vec<FarVelocity>,
+    outside: Vec<OutsideVelocity>,
     /// Values of ε, with the logarithm of their weight times (1 - ε) for each velocity of the core.
     rates: Vec<(f64, f64)>,
 }
 
 /// Velocities outside the core that are nearly equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct FarVelocity {
+struct OutsideVelocity {
     /// Distance from the centre of the likelihood, m/s.
     offset: f64,
     count: f64,
@@ -61,34 +61,39 @@ pub struct OutlierShare {
 impl Contamination {
     /// Returns whether a velocity is outside the core, given whether the velocities have subjects:
     /// those are then kept together as far as possible.
-    pub(super) fn is_far(scale: &RobustScale, velocity: f64, has_subjects: bool) -> bool {
-        let radius = if has_subjects { scale.far } else { CORE };
+    pub(super) fn is_outside_core(scale: &RobustScale, velocity: f64, has_subjects: bool) -> bool {
+        let radius = if has_subjects { scale.outlying_from } else { CORE };
         scale.deviations(velocity).abs() > radius
     }
 
-    /// Creates it for `core` velocities in the core and the others, `far` (m/s); `None` if there are no
+    /// Creates it for `core` velocities in the core and the others, `outside` (m/s); `None` if there are no
     /// others. `centre` is that of the likelihood.
-    pub(super) fn new(scale: &RobustScale, core: usize, far: &[f64], centre: f64) -> Option<Self> {
-        if far.is_empty() {
+    pub(super) fn new(
+        scale: &RobustScale,
+        core: usize,
+        outside: &[f64],
+        centre: f64,
+    ) -> Option<Self> {
+        if outside.is_empty() {
             return None;
         }
-        let mut ascending = far.to_vec();
+        let mut ascending = outside.to_vec();
         ascending.sort_unstable_by(f64::total_cmp);
         let merged = |close: f64| merged(&ascending, close * scale.deviation);
         let mut close = CLOSE;
         let mut different = merged(close);
-        while different.len() > FAR_MAX {
+        while different.len() > OUTSIDE_MAX {
             close *= 2.0;
             different = merged(close);
         }
         let velocity = |(velocity, count): (f64, f64)| {
             let score = scale.deviations(velocity) / BROAD;
             let broad = 1.0 / (PI * BROAD * scale.deviation * score.mul_add(score, 1.0));
-            FarVelocity { offset: velocity - centre, count, broad }
+            OutsideVelocity { offset: velocity - centre, count, broad }
         };
-        let far = different.into_iter().map(velocity).collect::<Vec<FarVelocity>>();
-        let outside: f64 = far.iter().map(|one| one.count).sum();
-        Some(Self { far, rates: rates(core as f64, outside) })
+        let outside = different.into_iter().map(velocity).collect::<Vec<OutsideVelocity>>();
+        let outside_count: f64 = outside.iter().map(|one| one.count).sum();
+        Some(Self { outside, rates: rates(core as f64, outside_count) })
     }
 
     /// Returns the logarithm of the density of the velocities outside the core, times (1 - ε) for
@@ -109,13 +114,17 @@ impl Contamination {
             values.sum::<f64>() / total
         };
         let normal = Ratio::new(mean, variance);
-        let probability = |one: &FarVelocity| {
+        let probability = |one: &OutsideVelocity| {
             let ratio = normal.at(one);
             average(&|rate| rate / ((1.0 - rate) * ratio + rate))
         };
         OutlierShare {
             mean: average(&|rate| rate),
-            probabilities: self.far.iter().map(|f| (centre + f.offset, probability(f))).collect(),
+            probabilities: self
+                .outside
+                .iter()
+                .map(|f| (centre + f.offset, probability(f)))
+                .collect(),
         }
     }
 
@@ -123,7 +132,7 @@ impl Contamination {
     fn logs(&self, mean: f64, variance: f64) -> Vec<f64> {
         let normal = Ratio::new(mean, variance);
         let ratios: Vec<(f64, f64)> =
-            self.far.iter().map(|one| (normal.at(one), one.count)).collect();
+            self.outside.iter().map(|one| (normal.at(one), one.count)).collect();
         let of = |&(rate, log_weight): &(f64, f64)| {
             let mixture = |ratio: f64| (1.0 - rate).mul_add(ratio, rate);
             let mut log = log_weight;
@@ -169,7 +178,7 @@ impl Ratio {
         Self { mean, variance, height: 1.0 / (2.0 * PI * variance).sqrt() }
     }
 
-    fn at(&self, velocity: &FarVelocity) -> f64 {
+    fn at(&self, velocity: &OutsideVelocity) -> f64 {
         let off = velocity.offset - self.mean;
         self.height * libm::exp(-0.5 * off * off / self.variance) / velocity.broad
     }

@@ -27,7 +27,7 @@ const RESAMPLED_MAX: usize = 5_000;
 /// The resamples are the same for the same number of subjects, and do not depend on the seed of a
 /// job.
 pub fn moment_intervals(set: &VelocitySet<'_>) -> Option<MomentIntervals> {
-    let parts = set.parts();
+    let parts = set.independent_count();
     if (parts as u64) < PARTS_MIN {
         return None;
     }
@@ -120,7 +120,7 @@ impl Influences {
 /// the velocities are independent.
 fn by_part(set: &VelocitySet<'_>, values: impl Iterator<Item = f64>) -> Vec<f64> {
     let Some(subjects) = set.subjects else { return values.collect() };
-    let mut sums = vec![Sum::default(); set.parts()];
+    let mut sums = vec![Sum::default(); set.independent_count()];
     for (value, &subject) in values.zip(subjects) {
         sums[subject as usize].add(value);
     }

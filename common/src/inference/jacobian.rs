@@ -29,7 +29,7 @@ pub fn jacobian(
     let base = best.velocity?.moments;
     let means = best.observables.map(|found| found.map(|found| found.mean));
     let of_data = specification.data.as_ref()?.compared(set).observables;
-    let observables = of_data.set();
+    let observables = of_data.which();
     let mut jacobian = Jacobian { free: Vec::new(), columns: Vec::new(), observables };
     for parameter in Parameter::ALL {
         let range = specification.range(parameter);

@@ -74,11 +74,11 @@ pub fn data_noise(data: &Data, set: usize) -> Option<DataNoise> {
     }
     let velocities = data.set(set)?;
     // Less work where nothing else is compared.
-    let covariance = match velocities.observables.set().is_empty() {
+    let covariance = match velocities.observables.which().is_empty() {
         true => of_velocities(statistics::covariance_of_logarithms(&velocities)?),
         false => statistics::covariance_of_moments(&velocities)?,
     };
-    Some(DataNoise { covariance, freedom: velocities.parts() as u64 - 1 })
+    Some(DataNoise { covariance, freedom: velocities.independent_count() as u64 - 1 })
 }
 
 /// Returns the noise that the moments of the velocities of set number `set` would have if these were

@@ -73,7 +73,7 @@ pub(super) fn covariance_of_means<const N: usize>(
         let pairs = velocities * (velocities - 1.0);
         return Some(products(influences).map(|row| row.map(|sum| sum / pairs)));
     };
-    let parts = set.parts();
+    let parts = set.independent_count();
     if parts < 2 {
         return None;
     }

@@ -13,7 +13,8 @@ const RATIO_STEPS: usize = 64;
 /// probably slowest to compute, then a sequence that fills the box evenly.
 pub(super) fn points(specification: &JobSpecification, count: usize) -> Vec<Point> {
     // Where groups have setups of their own, the first that is searched stands for all.
-    let set = specification.data.as_ref().and_then(|data| data.searched_sets().next()).unwrap_or(0);
+    let set =
+        specification.data.as_ref().and_then(|data| data.searchable_sets().next()).unwrap_or(0);
     let ranges = specification.ranges_of(set);
     let free = specification.free().count();
     let mut points = vec![specification.start_of(set)];

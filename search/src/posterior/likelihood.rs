@@ -41,7 +41,7 @@ impl SetLikelihood {
             false => Some(MeasuredMeans {
                 weights: MomentWeights::of_data(data, set)?,
                 data: compared.in_logarithms(&compared),
-                parts: data.set(set)?.parts() as f64,
+                parts: data.set(set)?.independent_count() as f64,
             }),
         };
         let velocities = of_velocities(specification, set)?;
@@ -74,7 +74,7 @@ impl SetLikelihood {
 
     /// Returns the observables that were measured.
     pub(super) fn observables(&self) -> ObservableSet {
-        self.data.observables.set()
+        self.data.observables.which()
     }
 
     /// Returns rough standard errors of the data's moments, of the observables given the velocities, as a

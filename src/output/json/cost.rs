@@ -20,7 +20,7 @@ pub(super) fn value(shown: &ShownCost<'_>) -> Value {
         "method": searched.then(|| search.method.name()),
         "objective": searched.then(|| specification.objective.name()),
         "free": specification.free().map(Parameter::name).collect::<Vec<_>>(),
-        "sets": specification.data.as_ref().map_or(1, Data::searched),
+        "sets": specification.data.as_ref().map_or(1, Data::searchable_count),
         "starts": search.starts,
         "posterior": posterior.is_some(),
         "realizations": specification.monte_carlo.realizations,

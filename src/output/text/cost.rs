@@ -55,7 +55,8 @@ fn described(data: &Data) -> String {
         Measurements::Moments { .. } => "the moments of the velocities".to_owned(),
         Measurements::Groups(groups) => {
             let count = groups.iter().map(|group| group.velocities.len()).sum::<usize>();
-            let [groups, searched] = [groups.len(), data.searched()].map(|count| count as u64);
+            let [groups, searched] =
+                [groups.len(), data.searchable_count()].map(|count| count as u64);
             let velocities = counted(count as u64, "velocity");
             let rest = if searched < groups {
                 format!(", of which {searched} can be searched")

@@ -44,7 +44,7 @@ pub fn likelihood_fit(
     set: &VelocitySet<'_>,
 ) -> Option<LikelihoodFit> {
     let law = Law::from_outcomes(monte_carlo, point, outcomes)?;
-    if set.parts() < 2 {
+    if set.independent_count() < 2 {
         return None;
     }
     let fit = LocationScale { law: &law, set };
@@ -135,7 +135,7 @@ impl LocationScale<'_> {
     /// sum, each product is divided by 1 - h with the leverage h = sᵀ M s, at most [`LEVERAGE_MAX`]
     /// (as HC2 of J. G. MacKinnon and H. White, J. Econometrics 29 (1985)).
     fn products(&self, at: [f64; 2], inverse: Option<[[f64; 2]; 2]>) -> [[f64; 2]; 2] {
-        let mut parts = vec![[Sum::default(); 2]; self.set.parts()];
+        let mut parts = vec![[Sum::default(); 2]; self.set.independent_count()];
         for (index, scores) in self.scores(at).enumerate() {
             let part = self.set.subjects.map_or(index, |subjects| subjects[index] as usize);
             parts[part].iter_mut().zip(scores).for_each(|(sum, score)| sum.add(score));

@@ -132,7 +132,7 @@ pub(super) fn with_columns(
     records: Vec<u8>,
     observables: PerObservable<Option<&[f64]>>,
 ) -> Vec<u8> {
-    if observables.set().is_empty() {
+    if observables.which().is_empty() {
         return records;
     }
     let bits = observables.present().map(|(one, _)| 1 << (one as u8)).sum();

@@ -234,7 +234,7 @@ fn joined(
     pieces: Vec<(usize, Unpacked)>,
 ) -> Option<Outcomes> {
     for (first, (more, more_columns)) in pieces {
-        if first != outcomes.len() || more_columns.set() != columns.set() {
+        if first != outcomes.len() || more_columns.which() != columns.which() {
             return None;
         }
         outcomes.extend(more);

@@ -179,8 +179,8 @@ fn decays_determine_a_third_parameter() {
     let (model, data) = (decay(best.observables), decay(with.data.unwrap().observables));
     let (model, data) = (model.unwrap(), data.unwrap());
     assert!((model.mean - data.mean).abs() < 0.01 * data.standard_error);
-    assert!(without.best.unwrap().observables.set().is_empty());
-    assert!(without.data.unwrap().observables.set().is_empty());
+    assert!(without.best.unwrap().observables.which().is_empty());
+    assert!(without.data.unwrap().observables.which().is_empty());
     // Profiles come from a closed form that knows nothing of decays.
     assert!(with.conclusions.profiles.is_empty() && !without.conclusions.profiles.is_empty());
     let sensitivities = with.conclusions.inference.unwrap().sensitivities;
