@@ -59,9 +59,6 @@ pub(crate) struct Job {
     pub(crate) fleet: Option<FleetRate>,
     /// Number of workers that have answered a batch of it, each stay counted.
     pub(crate) rated_workers: u64,
-    /// Number of batches of it that were sent since `unknown_since` although nobody knew how long they take.
-    pub(crate) unknown_sent: usize,
-    pub(crate) unknown_since: Duration,
     /// The newest duplicate of one of its overdue batches.
     pub(crate) newest_overdue_duplicate: Option<BatchId>,
     /// Sequence number of its last published snapshot.
@@ -101,8 +98,6 @@ impl Job {
             pace: RealizationTime::default(),
             fleet: None,
             rated_workers: 0,
-            unknown_sent: 0,
-            unknown_since: now,
             newest_overdue_duplicate: None,
             sequence: sequence(0, now),
             progressed: now,

@@ -16,7 +16,7 @@
 use std::collections::BTreeSet;
 
 use crate::core::batch::{Assignment, Purpose};
-use crate::core::ids::{BatchId, JobId, WorkerId};
+use crate::core::ids::{BatchId, WorkerId};
 use crate::core::job::Job;
 use crate::core::reactor::turn::Turn;
 
@@ -44,7 +44,6 @@ pub(crate) fn dispatch(turn: &mut Turn) {
     }
     let mut kept = poison::dispatch(turn);
     overdue::dispatch(turn, &mut kept);
-    sizing::allow_unknown_again(turn.state, turn.now);
     while schedule::work_waits(turn.state) && hand_one(turn, &kept) {}
     if schedule::next_job(turn.state).is_some() {
         // The batches that wait are sent after one of the next events. Until then no worker gets a
@@ -88,10 +87,7 @@ fn hand(turn: &mut Turn, worker: WorkerId) -> bool {
 /// Sends a worker a batch of the job that is next in turn; `None` if it gets none now.
 fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
     let attached = turn.state.workers.get(&worker)?;
-    let may = |id: JobId, job: &Job| {
-        attached.rates.contains_key(&id) || !sizing::must_wait_for_rates(job)
-    };
-    let job = schedule::next_job_that_may(turn.state, may)?;
+    let job = schedule::next_job(turn.state)?;
     let (attempt, queued) = turn.state.jobs.get(&job).and_then(next_evaluation)?;
     let size = if turn.state.is_sound(attached) {
         let fleet = sizing::fleet_rate(turn.state, job);
@@ -103,8 +99,6 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
         if is_busy && sizing::is_one_batch_each(turn.state, attached, job, fleet, size) {
             return None;
         }
-        let is_unknown = sizing::worker_rate(attached, job, fleet).is_none();
-        turn.state.jobs.get_mut(&job)?.unknown_sent += usize::from(is_unknown);
         size
     } else if !turn.state.probation.is_paused(&attached.name, turn.now)
         || !turn.state.answers_batches(|_| true)

@@ -26,13 +26,8 @@ pub(crate) fn free_workers<'a>(
 /// computing time comes first; of its jobs those with the highest priority are served in turn,
 /// starting after the job that was served last.
 pub(crate) fn next_job(state: &State) -> Option<JobId> {
-    next_job_that_may(state, |_, _| true)
-}
-
-/// As [`next_job`], among the jobs that may be served now.
-pub(crate) fn next_job_that_may(state: &State, may: impl Fn(JobId, &Job) -> bool) -> Option<JobId> {
     let with_work = state.active.iter().filter_map(|id| {
-        let job = state.jobs.get(id).filter(|job| may(*id, job))?;
+        let job = state.jobs.get(id)?;
         let waits = job.evaluation().is_some_and(|it| !it.queue.is_empty());
         (waits || job.ahead.has_queue()).then_some((*id, job))
     });

@@ -15,16 +15,13 @@
 //! - If there are enough workers for one such batch each, R is the time of the whole evaluation, not
 //!   of what is left, so that all batches are equal.
 
-use std::time::Duration;
-
 use osteon_common::limits::BATCH_REALIZATIONS_MAX;
 
 use super::ahead;
 use crate::core::ids::JobId;
 use crate::core::job::{FleetRate, Job};
 use crate::core::policy::{
-    AUDIT_S, BATCH_COST_S, BATCH_WORTH_S, FIRST_BATCH_PER_SLOT, FLEET_RATE_USES_MIN,
-    RATED_WORKERS_MIN, SHARE_DIVISOR, UNKNOWN_AT_ONCE, UNKNOWN_TIME,
+    AUDIT_S, BATCH_COST_S, BATCH_WORTH_S, FIRST_BATCH_PER_SLOT, RATED_WORKERS_MIN, SHARE_DIVISOR,
 };
 use crate::core::state::{AttachedWorker, State};
 
@@ -126,23 +123,6 @@ fn realizations(state: &State, id: JobId) -> f64 {
     job.map_or(0, |job| job.record.specification.monte_carlo.realizations) as f64
 }
 
-/// Returns whether workers of unknown speed get no batch of a job for now: enough are out that answers will soon
-/// tell how large the next ones should be.
-pub(crate) fn must_wait_for_rates(job: &Job) -> bool {
-    job.unknown_sent >= UNKNOWN_AT_ONCE && job.rated_workers < RATED_WORKERS_MIN
-}
-
-/// Lets jobs send batches of unknown duration again after [`UNKNOWN_TIME`] without answers.
-pub(crate) fn allow_unknown_again(state: &mut State, now: Duration) {
-    for id in &state.active {
-        if let Some(job) = state.jobs.get_mut(id)
-            && now.saturating_sub(job.unknown_since) >= UNKNOWN_TIME
-        {
-            (job.unknown_since, job.unknown_sent) = (now, 0);
-        }
-    }
-}
-
 /// Returns the rate of a worker at a job, realizations per second: as measured, or else the mean rate of
 /// the others for as many slots; `None` if too few of them are known.
 pub(crate) fn worker_rate(attached: &AttachedWorker, job: JobId, fleet: FleetRate) -> Option<f64> {
@@ -182,8 +162,7 @@ pub(crate) fn batches_served_within(seconds: f64) -> usize {
 /// workers, so that measuring costs each batch the look at one worker; and at once if workers came or
 /// went, or if twice as many of them have computed something of the job.
 pub(crate) fn fleet_rate(state: &mut State, id: JobId) -> FleetRate {
-    let uses_max = FLEET_RATE_USES_MIN.max(state.workers.len() as u64);
-    let changes = state.fleet_changes;
+    let (uses_max, changes) = (state.workers.len() as u64, state.fleet_changes);
     if let Some(Job { fleet: Some(fleet), rated_workers, .. }) = state.jobs.get_mut(&id) {
         let is_current = fleet.changes == changes
             && fleet.uses < uses_max
