@@ -46,7 +46,7 @@ pub struct PoreFluid {
 
 /// The bone between the pores.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Matrix {
+pub struct BoneMatrix {
     /// Mass density, kg/m³.
     pub density: f64,
     /// Elasticity.
@@ -59,7 +59,7 @@ pub struct PorosityModel {
     /// The estimate.
     pub homogenisation: Homogenisation,
     /// The bone between the pores.
-    pub matrix: Matrix,
+    pub matrix: BoneMatrix,
     /// The fluid in them.
     pub fluid: PoreFluid,
 }
@@ -101,7 +101,7 @@ impl Default for PoreFluid {
     }
 }
 
-impl Default for Matrix {
+impl Default for BoneMatrix {
     /// The matrix of which the Mori-Tanaka estimate, with a tenth of water, is the paper's optimum, to
     /// six digits. That its bones have a tenth is an assumption (docs/physics.md).
     fn default() -> Self {
@@ -161,7 +161,7 @@ impl Section for PorosityModel {
     }
 }
 
-impl Section for Matrix {
+impl Section for BoneMatrix {
     fn declare(&mut self, fields: &mut dyn Fields) {
         let constants = &mut self.constants;
         let declared: [(Parameter, &mut f64, &'static PlausibleRange); 6] = [

@@ -6,7 +6,7 @@ mod support;
 
 use osteon_common::case::Case;
 use osteon_common::elasticity::EngineeringConstants;
-use osteon_common::porosity::{Homogenisation, Matrix, PoreFluid, PorosityModel};
+use osteon_common::porosity::{BoneMatrix, Homogenisation, PoreFluid, PorosityModel};
 use osteon_files::case_file;
 use osteon_files::document::Format;
 
@@ -31,7 +31,7 @@ fn a_case_has_the_bone_of_its_porosity() {
 fn every_key_of_the_model_counts() {
     let model = PorosityModel {
         homogenisation: Homogenisation::SelfConsistent,
-        matrix: Matrix {
+        matrix: BoneMatrix {
             density: 1900.0,
             constants: EngineeringConstants {
                 longitudinal_young_modulus: 22e9,
