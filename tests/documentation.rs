@@ -282,6 +282,7 @@ fn the_tables_of_keys_are_those_of_the_program() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/job-files.md");
     let page = fs::read_to_string(&path).unwrap();
     let current = with_keys(&page, "setup", &job_file::setup_table());
+    let current = with_keys(&current, "porosity", &job_file::porosity_table());
     let current = with_keys(&current, "job", &job_file::job_table());
     if std::env::var_os("OSTEON_WRITE_DOCS").is_some() {
         fs::write(&path, &current).unwrap();

@@ -166,11 +166,19 @@ pub(crate) const MODULUS: PlausibleRange = PlausibleRange {
     possible: (1e6, f64::INFINITY),
     units: &[other("GPa", 9), other("MPa", 6)],
 };
-const POISSON_RATIO: PlausibleRange = PlausibleRange {
+pub(crate) const POISSON_RATIO: PlausibleRange = PlausibleRange {
     unit: "",
     typical: 0.35,
     usual: (-0.5, 1.0),
     possible: (0.0, 5.0),
+    units: PER_CENT,
+};
+/// Porosity of cortical bone. Where it is spongy, it has more.
+pub(crate) const POROSITY: PlausibleRange = PlausibleRange {
+    unit: "",
+    typical: 0.1,
+    usual: (0.0, 0.3),
+    possible: (0.0, 1.0),
     units: PER_CENT,
 };
 const DISPERSION: PlausibleRange = PlausibleRange {

@@ -1,5 +1,7 @@
 //! Case files: one deterministic problem, in TOML or JSON.
 
+mod porosity;
+
 use std::path::Path;
 
 use osteon_common::case::{Bone, Case};
@@ -9,6 +11,7 @@ use osteon_common::field_path::element_path;
 use osteon_common::limits;
 use osteon_common::parameters::Parameter;
 use osteon_common::plausible::PlausibleRange;
+use osteon_common::porosity::{POROSITY, PorosityModel};
 
 use crate::document::{Format, Node, Value};
 use crate::document_text::DocumentText;
@@ -97,42 +100,68 @@ fn of_tree(document: DocumentText<'_>, root: &Node) -> Result<Case, Invalid> {
 fn bone(reader: &mut Reader, root: &Table<'_>) -> Option<Bone> {
     let mut keys = vec![materials::KEY, Parameter::Density.name(), "mandel"];
     keys.extend(CONSTANTS.map(Parameter::name));
+    keys.extend([POROSITY.name, PorosityModel::KEY.name]);
     let table = reader.table(root, "bone", &keys);
     if !table.is_table() {
         if !root.has("bone") {
-            let message = format!("is missing; it must have a material, or density and {FORMS}");
+            let message = format!(
+                "is missing; it must have a material, or density and {FORMS}, or a porosity"
+            );
             reader.lacks("bone", &["bone".to_owned()], message);
         }
         return None;
     }
-    let base = Base::read(reader, &table);
+    let model = porosity::model(reader, &table);
+    let model_path = table.path(PorosityModel::KEY.name);
+    if table.has(PorosityModel::KEY.name) && !table.has(POROSITY.name) {
+        let cures = [table.path(POROSITY.name)];
+        let message = "is given without a porosity; give bone.porosity, or leave it out";
+        reader.lacks(&model_path, &cures, message);
+        return None;
+    }
+    solid(reader, &table, &model, &model_path)
+}
+
+/// Returns the bone that the keys of `table` describe, or `None` after recording the violations. The model
+/// of a porosity is the table at `model_path`.
+fn solid(
+    reader: &mut Reader,
+    table: &Table<'_>,
+    model: &PorosityModel,
+    model_path: &str,
+) -> Option<Bone> {
+    if table.has(POROSITY.name) {
+        return porosity::bone(reader, table, model, model_path);
+    }
+    let base = Base::read(reader, table);
     let named = table.has(materials::KEY).then_some(materials::KEY);
     let given =
         named.or_else(|| CONSTANTS.map(Parameter::name).into_iter().find(|key| table.has(key)));
     // Matrices are written by programs and may have any scale; constants are typed by people, so
     // their unit is checked.
-    let density = required(reader, &table, Parameter::Density, base, given.is_some());
+    let density = required(reader, table, Parameter::Density, base, given.is_some());
     let elasticity = match (table.has("mandel"), given) {
-        (true, None) => mandel(reader, &table),
+        (true, None) => mandel(reader, table),
         (true, Some(other)) => {
             let cure = match other {
                 materials::KEY => "leave one of them out".to_owned(),
                 _ => format!("give {FORMS}, not both"),
             };
-            reader.violations.add("bone.mandel", format!("is given together with {other}; {cure}"));
+            reader
+                .violations
+                .add(table.path("mandel"), format!("is given together with {other}; {cure}"));
             None
         }
         (false, None) => {
-            let cures = [&["mandel", materials::KEY][..], &CONSTANTS.map(Parameter::name)].concat();
+            let others = ["mandel", materials::KEY, POROSITY.name];
+            let cures = [&others[..], &CONSTANTS.map(Parameter::name)].concat();
             let cures: Vec<_> = cures.into_iter().map(|key| table.path(key)).collect();
-            reader.lacks(
-                "bone",
-                &cures,
-                format!("has no elasticity; give {FORMS}, or name a material"),
-            );
+            let message =
+                format!("has no elasticity; give {FORMS}, or name a material, or give a porosity");
+            reader.lacks("bone", &cures, message);
             None
         }
-        (false, Some(_)) => from_constants(reader, &table, base),
+        (false, Some(_)) => from_constants(reader, table, base),
     };
     Some(Bone { density: density?, elasticity: elasticity? })
 }
@@ -153,7 +182,7 @@ fn required(
     if !table.has(key) {
         let value = base.value(parameter);
         if value.is_none() {
-            let cures = [key, materials::KEY].map(|key| table.path(key));
+            let cures = [key, materials::KEY, POROSITY.name].map(|key| table.path(key));
             let message = format!("is missing; it must be {accepted}");
             reader.lacks(&cures[0], &cures, message);
         }

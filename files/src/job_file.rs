@@ -28,7 +28,7 @@ use crate::input_file::InputFile;
 use crate::reader::{self, Reader, Table};
 use crate::setting::Setting;
 
-pub use self::key_tables::{job_table, setup_table};
+pub use self::key_tables::{job_table, porosity_table, setup_table};
 pub use self::purpose::{FilePurpose, purpose};
 pub use self::schema::schema;
 pub use crate::toml_text::job as to_toml;

@@ -329,7 +329,12 @@ fn toml_and_json_say_the_same() {
             job(&as_json(text), Format::Json, JobKind::Identification)
         );
     }
-    for text in [include_str!("files/case.toml"), include_str!("files/mandel.toml")] {
+    let cases = [
+        include_str!("files/case.toml"),
+        include_str!("files/mandel.toml"),
+        include_str!("files/porosity.toml"),
+    ];
+    for text in cases {
         assert_eq!(case(text, Format::Toml), case(&as_json(text), Format::Json));
     }
 }

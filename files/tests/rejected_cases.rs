@@ -155,7 +155,7 @@ fn files_that_cannot_be_read() {
         "d.TOML",
         Some(b""),
         "DIR/d.TOML: 1 error\n  bone: is missing; it must have a material, or density and either the five \
-         engineering constants or mandel",
+         engineering constants or mandel, or a porosity",
     );
     assert!(case_file::read(directory.path()).is_err());
 }

@@ -4,6 +4,7 @@ use osteon_common::case::Setup;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, entries};
 use osteon_common::job::{PosteriorSettings, RunSettings};
 use osteon_common::parameters::{BONE_PARAMETERS, Parameter};
+use osteon_common::porosity::{self, POROSITY, PorosityModel};
 
 use crate::toml_text;
 
@@ -14,6 +15,17 @@ pub fn setup_table() -> String {
     let mut setup = Setup::default();
     let sections = setup.sections().map(|(key, section)| rows(key.name, &entries(section)));
     table(&sections.concat())
+}
+
+/// Returns the table of the keys of a case file that give its bone by a porosity.
+pub fn porosity_table() -> String {
+    let (section, accepted) = (PorosityModel::KEY, porosity::ACCEPTED.to_string());
+    table(&format!(
+        "{}{}{}",
+        row(&format!("bone.{}", POROSITY.name), "", &accepted, POROSITY.meaning),
+        row(&format!("bone.{}", section.name), "", "", section.meaning),
+        rows(&format!("bone.{}", section.name), &entries(&mut PorosityModel::default())),
+    ))
 }
 
 /// Returns the table of the other keys of a job file.

@@ -1,0 +1,103 @@
+//! Porosities in case files.
+
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
+
+mod support;
+
+use osteon_common::case::Case;
+use osteon_common::elasticity::EngineeringConstants;
+use osteon_common::porosity::{BoneMatrix, Homogenisation, PoreFluid, PorosityModel};
+use osteon_files::case_file;
+use osteon_files::document::Format;
+
+use support::pin;
+
+const EVERY_KEY: &str = include_str!("files/porosity.toml");
+
+fn case(text: &str) -> Result<Case, String> {
+    case_file::parse(text, Format::Toml).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_case_has_the_bone_of_its_porosity() {
+    let read = case("bone = { porosity = 0.1 }").unwrap();
+    assert_eq!(Ok(read.bone), PorosityModel::default().bone(0.1));
+    // A whole number is a number, too, and bone without pores is the matrix.
+    let read = case("bone = { porosity = 0 }").unwrap();
+    assert_eq!(Ok(read.bone), PorosityModel::default().bone(0.0));
+}
+
+#[test]
+fn every_key_of_the_model_counts() {
+    let model = PorosityModel {
+        homogenisation: Homogenisation::SelfConsistent,
+        matrix: BoneMatrix {
+            density: 1900.0,
+            constants: EngineeringConstants {
+                longitudinal_young_modulus: 22e9,
+                longitudinal_poisson_ratio: 0.35,
+                longitudinal_shear_modulus: 6.5e9,
+                transverse_young_modulus: 15e9,
+                transverse_poisson_ratio: 0.4,
+            },
+        },
+        fluid: PoreFluid { bulk_modulus: 2.2e9, density: 950.0 },
+    };
+    assert_eq!(Ok(case(EVERY_KEY).unwrap().bone), model.bone(0.12));
+    // Keys that are left out have their defaults.
+    let lighter = "[bone]\nporosity = 0.2\nporosity_model = { matrix = { density = 1900 } }";
+    let mut model = PorosityModel::default();
+    model.matrix.density = 1900.0;
+    assert_eq!(Ok(case(lighter).unwrap().bone), model.bone(0.2));
+}
+
+/// As with a material, nothing but the values goes on.
+#[test]
+fn the_complete_case_has_the_values_and_no_porosity() {
+    let read = case(EVERY_KEY).unwrap();
+    let written = case_file::to_toml(&read);
+    assert!(!written.contains("porosity"), "{written}");
+    assert_eq!(case(&written).unwrap(), read);
+}
+
+#[test]
+fn wrong_porosities_and_models_are_refused() {
+    let of_model = |model: &str| format!("[bone]\nporosity = 0.1\n[bone.porosity_model]\n{model}");
+    let alone = ["0.5", "-0.01", "10", "nan", "\"10 %\"", "{ surface = 0.05 }"];
+    let alone = alone.map(|value| format!("[bone]\nporosity = {value}"));
+    let beside = [
+        "[bone]\nporosity = 0.1\ndensity = 1800",
+        "[bone]\nporosity = 0.1\nmaterial = \"human-tibia-rho-1996\"",
+        "[bone]\nporosity = 0.1\nmandel = []",
+        "[bone]\nporosity = 0.1\nlongitudinal_young_modulus = 20e9\ntransverse_young_modulus = 12e9",
+        "[bone]\nporosety = 0.1",
+        "[bone]\nporosity_model = {}",
+        "[bone]\nporosety = 0.1\nporosity_model = {}",
+        "[bone]\nporosity = 0.1\nporosity_model = \"mori_tanaka\"",
+    ];
+    let models = [
+        "homogenization = \"mori_tanaka\"",
+        "homogenisation = \"self-consistent\"",
+        "matrix = { density = 1.9 }",
+        "matrix = { longitudinal_young_modulus = 22 }",
+        "matrix = { longitudinal_poisson_ratio = 0.9 }",
+        "matrix = { mandel = [] }",
+        "fluid = { bulk_modulus = 2.3 }",
+        "fluid = { bulk_modulus = -1, density = inf }",
+        "fluid = { bulk_modulus = 1e308 }",
+        "fluid = { sound_speed = 1500 }",
+        "homogenisation = \"self_consistent\"\nfluid = { bulk_modulus = 0 }\nmatrix = { density = 0 }",
+    ];
+    let soft = "[bone]\nporosity = 0.4\n[bone.porosity_model]\nhomogenisation = \"self_consistent\"\n\
+                fluid = { bulk_modulus = 0 }";
+    let texts = alone.into_iter().chain(beside.map(str::to_owned));
+    let texts = texts.chain(models.map(of_model)).chain([soft.to_owned()]);
+    let refused: Vec<_> = texts
+        .map(|text| {
+            let message = case(&text).err().unwrap_or_else(|| "ACCEPTED".to_owned());
+            (text, message)
+        })
+        .collect();
+    let refused = refused.iter().map(|(text, message)| (text.as_str(), message.clone()));
+    pin("rejected_porosity", refused);
+}
