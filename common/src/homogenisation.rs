@@ -40,7 +40,7 @@ struct Constraint {
 
 impl HillModuli {
     /// Returns those of a transversely isotropic solid. The entries that follow from others are ignored.
-    pub fn of(elasticity: &Elasticity) -> Self {
+    pub fn from_elasticity(elasticity: &Elasticity) -> Self {
         let c = elasticity.rows();
         Self {
             plane_bulk: 0.5 * (c[1][1] + c[1][2]),
@@ -85,7 +85,7 @@ impl HillModuli {
     /// `porosity` of the volume: the surroundings of the pores are the solid between them.
     #[must_use]
     pub fn mori_tanaka(&self, fluid_bulk_modulus: f64, porosity: f64) -> Self {
-        self.with_pores(fluid_bulk_modulus, porosity, Constraint::of(self))
+        self.with_pores(fluid_bulk_modulus, porosity, Constraint::from_medium(self))
     }
 
     /// Returns the self-consistent estimate: the surroundings of the pores are the porous solid itself.
@@ -100,7 +100,7 @@ impl HillModuli {
             axial_shear: self.axial_shear * (1.0 - 2.0 * porosity),
             ..*self
         };
-        Some(self.with_pores(fluid_bulk_modulus, porosity, Constraint::of(&surroundings)))
+        Some(self.with_pores(fluid_bulk_modulus, porosity, Constraint::from_medium(&surroundings)))
     }
 
     /// Returns the transverse shear modulus m that the self-consistent estimate has.
@@ -162,7 +162,7 @@ fn relative_strain(own: f64, of_pores: f64, porosity: f64, constraint: f64) -> f
 
 impl Constraint {
     /// Returns that of an infinite medium with these moduli.
-    fn of(medium: &HillModuli) -> Self {
+    fn from_medium(medium: &HillModuli) -> Self {
         let (bulk, shear) = (medium.plane_bulk, medium.transverse_shear);
         Self {
             plane_bulk: shear,

@@ -131,7 +131,7 @@ impl PorosityModel {
     /// # Errors
     /// If the matrix is not admissible, or if the estimate has no stiffness.
     pub fn bone(&self, porosity: f64) -> Result<Bone, NoPorousBone> {
-        let matrix = HillModuli::of(&self.matrix.constants.elasticity()?);
+        let matrix = HillModuli::from_elasticity(&self.matrix.constants.elasticity()?);
         let fluid = self.fluid.bulk_modulus;
         let moduli = match self.homogenisation {
             Homogenisation::MoriTanaka => matrix.mori_tanaka(fluid, porosity),

@@ -207,7 +207,7 @@ fn the_self_consistent_estimate_falls_faster_and_ends() {
 #[test]
 fn moduli_survive_the_way_there_and_back() {
     for solid in solids() {
-        all_close(HillModuli::of(&solid.elasticity().unwrap()), solid, 1e-13);
+        all_close(HillModuli::from_elasticity(&solid.elasticity().unwrap()), solid, 1e-13);
     }
 }
 
