@@ -18,7 +18,7 @@ mod token;
 mod worker;
 
 use crate::exit_status::{CommandFailure, ExitStatus};
-use crate::resolved::{Resolved, WorkersOperation};
+use crate::resolved::Resolved;
 use crate::signals::unless_interrupted;
 
 /// Executes the command line.
@@ -47,21 +47,17 @@ fn left_by_interruption(resolved: &Resolved) -> Option<&'static str> {
         | Resolved::Materials(_)
         | Resolved::Completions(_)
         | Resolved::Man(_) => None,
-        Resolved::Check { .. } | Resolved::Doctor { .. } | Resolved::Health { .. } => {
-            Some("nothing was changed")
-        }
+        Resolved::Check { .. }
+        | Resolved::Doctor { .. }
+        | Resolved::ListWorkers { .. }
+        | Resolved::Health { .. } => Some("nothing was changed"),
         Resolved::Simulate { .. } => Some("no results were saved"),
         Resolved::Observe { .. } => Some("no file was written"),
         Resolved::Job { command, .. } => Some(jobs::left_by_interruption(command)),
-        Resolved::Workers { command, .. } => Some(match command {
-            None => "nothing was changed",
-            Some(WorkersOperation::Drain { .. }) => {
-                "the worker may have been told to drain (see `osteon workers`)"
-            }
-            Some(WorkersOperation::Unban { .. }) => {
-                "the ban may have been lifted (see `osteon workers`)"
-            }
-        }),
+        Resolved::Drain { .. } => {
+            Some("the worker may have been told to drain (see `osteon worker list`)")
+        }
+        Resolved::Unban { .. } => Some("the ban may have been lifted (see `osteon worker list`)"),
         Resolved::Backup { .. } => Some("no copy was kept"),
         Resolved::Wing(command) => command.left_by_interruption(),
     }
@@ -89,13 +85,13 @@ async fn perform(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
         Resolved::Completions(arguments) => man::completions(&arguments),
         Resolved::Man(arguments) => man::write(&arguments),
         Resolved::Job { command, coordinator } => jobs::perform(command, &coordinator).await,
-        Resolved::Workers { command, coordinator, format } => match command {
-            None => operators::workers(&coordinator, format).await,
-            Some(WorkersOperation::Drain { worker }) => {
-                operators::drain(worker, &coordinator, format).await
-            }
-            Some(WorkersOperation::Unban { host }) => operators::unban(&host, &coordinator).await,
-        },
+        Resolved::ListWorkers { coordinator, format } => {
+            operators::workers(&coordinator, format).await
+        }
+        Resolved::Drain { worker, coordinator, format } => {
+            operators::drain(worker, &coordinator, format).await
+        }
+        Resolved::Unban { host, coordinator } => operators::unban(&host, &coordinator).await,
         Resolved::Health { coordinator, limit, format } => {
             operators::health(&coordinator, limit, format).await
         }

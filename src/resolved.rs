@@ -13,10 +13,11 @@ use osteon_worker::WorkerConfig;
 
 use crate::arguments::{
     Arguments, BackupArguments, CertsArguments, CheckArguments, Command, CompletionArguments,
-    CoordinatorArguments, DoctorArguments, DrawArguments, HealthArguments, InitArguments,
-    JobCommand, JobFileArguments, LogFormat, ManArguments, MaterialsArguments, ObserveArguments,
-    ProgressFormat, RunArguments, SchemaArguments, SimulateArguments, TokenArguments,
-    VerbosityArguments, WorkerArguments, WorkersArguments, WorkersCommand,
+    CoordinatorArguments, CoordinatorCommand, DoctorArguments, DrainArguments, DrawArguments,
+    HealthArguments, InitArguments, JobCommand, JobFileArguments, LogFormat, ManArguments,
+    MaterialsArguments, Noun, ObserveArguments, ProgressFormat, RunArguments, SchemaArguments,
+    SimulateArguments, TokenArguments, UnbanArguments, VerbosityArguments, WorkerArguments,
+    WorkerCommand, WorkerListArguments,
 };
 use crate::doctor::Patient;
 use crate::exit_status::CommandFailure;
@@ -110,16 +111,30 @@ pub(crate) enum Resolved {
         /// The coordinator to ask.
         coordinator: Remote,
     },
-    /// `workers`.
-    Workers {
-        /// The operation; without one they are listed.
-        command: Option<WorkersOperation>,
+    /// `worker list`.
+    ListWorkers {
         /// The coordinator to ask.
         coordinator: Remote,
         /// Output format.
         format: OutputFormat,
     },
-    /// `health`.
+    /// `worker drain`.
+    Drain {
+        /// Number of the worker.
+        worker: u64,
+        /// The coordinator to ask.
+        coordinator: Remote,
+        /// Output format.
+        format: OutputFormat,
+    },
+    /// `worker unban`.
+    Unban {
+        /// Name of the host.
+        host: String,
+        /// The coordinator to ask.
+        coordinator: Remote,
+    },
+    /// `coordinator health`.
     Health {
         /// The coordinator to ask.
         coordinator: Remote,
@@ -128,7 +143,7 @@ pub(crate) enum Resolved {
         /// Output format.
         format: OutputFormat,
     },
-    /// `backup`.
+    /// `coordinator backup`.
     Backup {
         /// Directory for the copy.
         directory: PathBuf,
@@ -139,21 +154,6 @@ pub(crate) enum Resolved {
     },
     /// A command of a wing.
     Wing(Box<dyn WingCommand>),
-}
-
-/// An operation on workers.
-#[derive(Debug)]
-pub(crate) enum WorkersOperation {
-    /// Drain a worker.
-    Drain {
-        /// Its number.
-        worker: u64,
-    },
-    /// Lift the ban of a host.
-    Unban {
-        /// Its name.
-        host: String,
-    },
 }
 
 /// One run of a job, from its job file to its result.
@@ -187,9 +187,12 @@ impl Resolved {
     /// # Errors
     /// When the environment holds something that cannot be meant.
     pub(crate) fn from_arguments(arguments: Arguments) -> Result<Self, CommandFailure> {
-        let context = &ProcessContext::from_process()?;
+        Self::from_command(arguments.command, &ProcessContext::from_process()?)
+    }
+
+    fn from_command(command: Command, context: &ProcessContext) -> Result<Self, CommandFailure> {
         let isa = ProcessContext::isa;
-        Ok(match arguments.command {
+        Ok(match command {
             Command::Identify(arguments) => {
                 run_command(JobKind::Identification, arguments, context)?
             }
@@ -204,8 +207,12 @@ impl Resolved {
                 Self::Observe { arguments, isa: isa()?, threads }
             }
             Command::JobWing(command) => Self::Wing(command.resolve(context)?),
-            Command::Coordinator(arguments) => Self::Coordinator(arguments),
-            Command::Worker(arguments) => resolve_worker(arguments, context, isa()?)?,
+            Command::Coordinator(Noun::Service(arguments)) => Self::Coordinator(arguments),
+            Command::Coordinator(Noun::Command(command)) => coordinator_command(command, context)?,
+            Command::Worker(Noun::Service(arguments)) => {
+                resolve_worker(arguments, context, isa()?)?
+            }
+            Command::Worker(Noun::Command(command)) => worker_command(command, context)?,
             Command::Certs(arguments) => Self::Certs(arguments),
             Command::Token(arguments) => Self::Token(arguments),
             Command::Init(arguments) => Self::Init(arguments),
@@ -221,19 +228,8 @@ impl Resolved {
             Command::Completions(arguments) => Self::Completions(arguments),
             Command::Man(arguments) => Self::Man(arguments),
             Command::Job(command) => job_command(command, context)?,
-            Command::Earlier(command) => job_command(command.into(), context)?,
-            Command::Workers(arguments) => resolve_workers(arguments, context)?,
+            Command::Earlier(command) => Self::from_command(command.into(), context)?,
             Command::ClusterWing(command) => Self::Wing(command.resolve(context)?),
-            Command::Health(HealthArguments { client, timeout, json }) => Self::Health {
-                coordinator: context.remote(client)?,
-                limit: Duration::from_secs_f64(timeout),
-                format: format(json),
-            },
-            Command::Backup(BackupArguments { directory, client, json }) => Self::Backup {
-                directory,
-                coordinator: context.remote(client)?,
-                format: format(json),
-            },
         })
     }
 
@@ -303,26 +299,42 @@ fn job_command(command: JobCommand, context: &ProcessContext) -> Result<Resolved
     Ok(Resolved::Job { command, coordinator })
 }
 
-fn resolve_workers(
-    arguments: WorkersArguments,
+fn worker_command(
+    command: WorkerCommand,
     context: &ProcessContext,
 ) -> Result<Resolved, CommandFailure> {
-    let WorkersArguments { command, client, json } = arguments;
-    let (command, client, json) = match command {
-        None => (None, client, json),
-        Some(WorkersCommand::Drain(drain)) => {
-            let operation = WorkersOperation::Drain { worker: drain.worker };
-            (Some(operation), drain.client.or(client), json || drain.json)
+    Ok(match command {
+        WorkerCommand::List(WorkerListArguments { client, json }) => {
+            Resolved::ListWorkers { coordinator: context.remote(client)?, format: format(json) }
         }
-        Some(WorkersCommand::Unban(unban)) => {
-            (Some(WorkersOperation::Unban { host: unban.host }), unban.client.or(client), json)
+        WorkerCommand::Drain(DrainArguments { worker, client, json }) => {
+            Resolved::Drain { worker, coordinator: context.remote(client)?, format: format(json) }
         }
-        Some(WorkersCommand::Wing(command)) => {
-            return Ok(Resolved::Wing(command.resolve(context, client)?));
+        WorkerCommand::Unban(UnbanArguments { host, client }) => {
+            Resolved::Unban { host, coordinator: context.remote(client)? }
         }
-    };
-    let (coordinator, format) = (context.remote(client)?, format(json));
-    Ok(Resolved::Workers { command, coordinator, format })
+        WorkerCommand::Wing(command) => Resolved::Wing(command.resolve(context)?),
+    })
+}
+
+fn coordinator_command(
+    command: CoordinatorCommand,
+    context: &ProcessContext,
+) -> Result<Resolved, CommandFailure> {
+    Ok(match command {
+        CoordinatorCommand::Health(HealthArguments { client, timeout, json }) => Resolved::Health {
+            coordinator: context.remote(client)?,
+            limit: Duration::from_secs_f64(timeout),
+            format: format(json),
+        },
+        CoordinatorCommand::Backup(BackupArguments { directory, client, json }) => {
+            Resolved::Backup {
+                directory,
+                coordinator: context.remote(client)?,
+                format: format(json),
+            }
+        }
+    })
 }
 
 fn resolve_worker(

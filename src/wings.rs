@@ -73,9 +73,9 @@ pub(crate) enum ClusterWing {
     Slurm(slurm::SlurmArguments),
 }
 
-/// Operations on workers.
+/// Commands about workers.
 #[derive(Debug, Subcommand)]
-pub(crate) enum WorkersWing {
+pub(crate) enum WorkerWing {
     /// Submit workers to Slurm as long as jobs wait for them, until interrupted
     ///
     /// Workers end by themselves when they have had no work for the idle timeout. Those that wait in
@@ -108,13 +108,21 @@ impl ClusterWing {
     }
 }
 
-impl WorkersWing {
-    /// Resolves the arguments; `client` is what stands before the operation.
-    #[cfg_attr(not(feature = "slurm"), expect(unused_variables, reason = "there is no operation"))]
-    pub(crate) fn resolve(self, context: &ProcessContext, client: ClientArguments) -> ResolvedWing {
+impl WorkerWing {
+    /// Returns what says where the coordinator is.
+    pub(crate) fn client_mut(&mut self) -> &mut ClientArguments {
+        match *self {
+            #[cfg(feature = "slurm")]
+            Self::Slurm(ref mut arguments) => &mut arguments.client,
+        }
+    }
+
+    /// Resolves the arguments.
+    #[cfg_attr(not(feature = "slurm"), expect(unused_variables, reason = "there is no command"))]
+    pub(crate) fn resolve(self, context: &ProcessContext) -> ResolvedWing {
         match self {
             #[cfg(feature = "slurm")]
-            Self::Slurm(arguments) => slurm::resolve_scaling(*arguments, context, client),
+            Self::Slurm(arguments) => slurm::resolve_scaling(*arguments, context),
         }
     }
 }

@@ -100,7 +100,7 @@ async fn list(coordinator: &Remote, format: OutputFormat) -> Result<ExitStatus, 
     Ok(ExitStatus::Done)
 }
 
-/// `jobs prune`: prints the ids of the deleted jobs.
+/// `prune`: prints the ids of the deleted jobs.
 async fn prune(
     arguments: PruneArguments,
     coordinator: &Remote,

@@ -1,4 +1,4 @@
-//! `workers`, `health`, `backup`: commands for operators of a coordinator.
+//! `worker list`, `worker drain`, `coordinator health` and others: commands for operators of a coordinator.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -23,7 +23,7 @@ const STORE: &str = "osteon.sqlite";
 const BESIDE_STORE: [&str; 3] =
     ["osteon.sqlite-wal", "osteon.sqlite-journal", "osteon.acknowledged"];
 
-/// `workers`: prints the attached workers, those that left last, and those that are banned.
+/// `worker list`: prints the attached workers, those that left last, and those that are banned.
 pub(super) async fn workers(
     coordinator: &Remote,
     format: OutputFormat,
@@ -35,7 +35,7 @@ pub(super) async fn workers(
     Ok(ExitStatus::Done)
 }
 
-/// `workers drain`: prints the worker's state afterwards.
+/// `worker drain`: prints the worker's state afterwards.
 pub(super) async fn drain(
     worker: u64,
     coordinator: &Remote,
@@ -46,7 +46,7 @@ pub(super) async fn drain(
     Ok(ExitStatus::Done)
 }
 
-/// `workers unban`: prints the host whose ban is lifted.
+/// `worker unban`: prints the host whose ban is lifted.
 pub(super) async fn unban(host: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
     let worker = user::connect(coordinator).await?.unban(host).await?;
     let line = format!("{}\n", visible::line(&worker.host));
@@ -54,7 +54,7 @@ pub(super) async fn unban(host: &str, coordinator: &Remote) -> Result<ExitStatus
     Ok(ExitStatus::Done)
 }
 
-/// `health`: prints whether a coordinator is serving; the exit code is 0 if it is.
+/// `coordinator health`: prints whether a coordinator is serving; the exit code is 0 if it is.
 pub(super) async fn health(
     coordinator: &Remote,
     limit: Duration,
@@ -79,7 +79,7 @@ pub(super) async fn health(
     }
 }
 
-/// `backup`: copies the store of a running coordinator, completely or not at all.
+/// `coordinator backup`: copies the store of a running coordinator, completely or not at all.
 pub(super) async fn backup(
     directory: &Path,
     coordinator: &Remote,

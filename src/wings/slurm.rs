@@ -1,4 +1,4 @@
-//! `slurm script` and `slurm array`, which print batch scripts; `workers slurm`, which submits workers as
+//! `slurm script` and `slurm array`, which print batch scripts; `worker slurm`, which submits workers as
 //! long as jobs wait for them.
 
 mod arguments;
@@ -14,7 +14,6 @@ use osteon_transport::endpoint::Endpoint;
 
 use self::resolved::SlurmTask;
 use super::{Performance, ResolvedWing, WingCommand};
-use crate::arguments::ClientArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
 use crate::process_context::ProcessContext;
@@ -32,13 +31,12 @@ pub(super) fn resolve(arguments: SlurmArguments, context: &ProcessContext) -> Re
     Ok(Box::new(resolved::scripts(arguments, context)?))
 }
 
-/// Resolves `workers slurm`.
+/// Resolves `worker slurm`.
 pub(super) fn resolve_scaling(
     arguments: ScalingArguments,
     context: &ProcessContext,
-    client: ClientArguments,
 ) -> ResolvedWing {
-    Ok(Box::new(resolved::scaling(arguments, context, client)?))
+    Ok(Box::new(resolved::scaling(arguments, context)?))
 }
 
 impl WingCommand for SlurmTask {
@@ -84,7 +82,7 @@ fn array(script: &WorkerScript, count: u32) -> Result<ExitStatus, CommandFailure
     print(&script.text(ARRAY_NAME, count, false).map_err(CommandFailure::bad_input)?)
 }
 
-/// `workers slurm`: looks and acts until it is interrupted, or once with `--dry-run`.
+/// `worker slurm`: looks and acts until it is interrupted, or once with `--dry-run`.
 async fn follow(plan: &ScalingPlan, dry_run: bool) -> Result<ExitStatus, CommandFailure> {
     check_workers(&plan.script)?;
     if dry_run {

@@ -17,7 +17,6 @@ use super::arguments::{
     AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
     WorkerArrayArguments,
 };
-use crate::arguments::ClientArguments;
 use crate::exit_status::CommandFailure;
 use crate::process_context::ProcessContext;
 
@@ -33,7 +32,7 @@ pub(super) enum SlurmTask {
         /// Number of workers.
         count: u32,
     },
-    /// `workers slurm`.
+    /// `worker slurm`.
     Follow {
         /// What is followed, and how.
         plan: Box<ScalingPlan>,
@@ -56,14 +55,13 @@ pub(super) fn scripts(
     }
 }
 
-/// Resolves `workers slurm`; `client` is what stands before the operation.
+/// Resolves `worker slurm`.
 pub(super) fn scaling(
     arguments: ScalingArguments,
     context: &ProcessContext,
-    client: ClientArguments,
 ) -> Result<SlurmTask, CommandFailure> {
     let ScalingArguments { min, max, backlog, interval, dry_run, .. } = arguments;
-    let coordinator = context.remote(arguments.client.or(client))?;
+    let coordinator = context.remote(arguments.client)?;
     if min > max {
         return Err(CommandFailure::bad_input(anyhow!(
             "--min {min} must not be larger than --max {max}"
