@@ -1,13 +1,11 @@
 //! The wings of the program: commands and options that nothing else needs. This is the only file that
 //! names them, and each is left out with its feature.
 
-use std::fmt::Debug;
-use std::pin::Pin;
-
 use clap::Subcommand;
 
 use crate::arguments::ClientArguments;
-use crate::exit_status::{CommandFailure, ExitStatus};
+use crate::exit_status::CommandFailure;
+use crate::prepared_command::PreparedCommand;
 use crate::process_context::ProcessContext;
 
 #[cfg(any(feature = "live", feature = "umbridge"))]
@@ -31,28 +29,6 @@ pub(crate) use self::report::ReportOption;
 pub(crate) use self::without::ReportOption;
 #[cfg(not(feature = "live"))]
 pub(crate) use self::without::{PageOptions, RunPageOption};
-
-/// A command of a wing, with environment and defaults resolved.
-pub(crate) trait WingCommand: Debug {
-    /// Returns the default log level.
-    fn default_log_level(&self) -> &'static str {
-        "warn"
-    }
-
-    /// Returns what is said of what an interrupted command leaves behind; `None` if it treats
-    /// interruptions itself, or ends at once.
-    fn left_by_interruption(&self) -> Option<&'static str> {
-        None
-    }
-
-    /// Executes the command.
-    fn perform(self: Box<Self>) -> Performance;
-}
-
-/// The execution of a command.
-pub(crate) type Performance = Pin<Box<dyn Future<Output = Result<ExitStatus, CommandFailure>>>>;
-
-type ResolvedWing = Result<Box<dyn WingCommand>, CommandFailure>;
 
 /// Commands about a job and its results.
 #[derive(Debug, Subcommand)]
@@ -85,25 +61,39 @@ pub(crate) enum WorkerWing {
 }
 
 impl JobWing {
-    /// Resolves the arguments.
+    /// Prepares the command.
+    ///
+    /// # Errors
+    /// When arguments and environment do not say enough.
     #[cfg_attr(not(feature = "umbridge"), expect(unused_variables, reason = "a report needs none"))]
-    pub(crate) fn resolve(self, context: &ProcessContext) -> ResolvedWing {
+    pub(crate) fn prepare(
+        self,
+        context: &ProcessContext,
+    ) -> Result<PreparedCommand, CommandFailure> {
         match self {
             #[cfg(feature = "report")]
-            Self::Report(arguments) => Ok(Box::new(arguments)),
+            Self::Report(arguments) => {
+                Ok(PreparedCommand::brief(move || report::report(&arguments)))
+            }
             #[cfg(feature = "umbridge")]
-            Self::Umbridge(arguments) => umbridge::resolve(*arguments, context),
+            Self::Umbridge(arguments) => umbridge::prepare(*arguments, context),
         }
     }
 }
 
 impl ClusterWing {
-    /// Resolves the arguments.
+    /// Prepares the command.
+    ///
+    /// # Errors
+    /// When arguments and environment do not say enough.
     #[cfg_attr(not(feature = "slurm"), expect(unused_variables, reason = "there is no command"))]
-    pub(crate) fn resolve(self, context: &ProcessContext) -> ResolvedWing {
+    pub(crate) fn prepare(
+        self,
+        context: &ProcessContext,
+    ) -> Result<PreparedCommand, CommandFailure> {
         match self {
             #[cfg(feature = "slurm")]
-            Self::Slurm(arguments) => slurm::resolve(arguments, context),
+            Self::Slurm(arguments) => slurm::prepare(arguments, context),
         }
     }
 }
@@ -117,12 +107,18 @@ impl WorkerWing {
         }
     }
 
-    /// Resolves the arguments.
+    /// Prepares the command.
+    ///
+    /// # Errors
+    /// When arguments and environment do not say enough.
     #[cfg_attr(not(feature = "slurm"), expect(unused_variables, reason = "there is no command"))]
-    pub(crate) fn resolve(self, context: &ProcessContext) -> ResolvedWing {
+    pub(crate) fn prepare(
+        self,
+        context: &ProcessContext,
+    ) -> Result<PreparedCommand, CommandFailure> {
         match self {
             #[cfg(feature = "slurm")]
-            Self::Slurm(arguments) => slurm::resolve_scaling(*arguments, context),
+            Self::Slurm(arguments) => slurm::prepare_scaling(*arguments, context),
         }
     }
 }

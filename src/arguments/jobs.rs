@@ -31,23 +31,6 @@ pub(crate) enum JobCommand {
     Prune(PruneArguments),
 }
 
-impl JobCommand {
-    /// Returns what says where the coordinator is.
-    pub(crate) fn client(&self) -> ClientArguments {
-        let client = match self {
-            Self::Submit(SubmitArguments { client, .. })
-            | Self::List(JobListArguments { client, .. })
-            | Self::Watch(WatchArguments { job: JobArguments { client, .. }, .. })
-            | Self::Explain(ExplainArguments { client, .. })
-            | Self::Cancel(JobArguments { client, .. })
-            | Self::Fetch(FetchArguments { client, .. })
-            | Self::Recheck(WatchArguments { job: JobArguments { client, .. }, .. })
-            | Self::Prune(PruneArguments { client, .. }) => client,
-        };
-        client.clone()
-    }
-}
-
 /// Arguments of `submit`.
 #[derive(Debug, Args)]
 pub(crate) struct SubmitArguments {
