@@ -25,12 +25,13 @@ pub(crate) struct Telemetry {
 }
 
 impl Telemetry {
-    /// Begins the export, if it is wanted, of the service `name` unless the environment gives another name. Must be called within a runtime.
+    /// Begins the export, if it is wanted, under `name` unless the environment gives another one. Must be
+    /// called within a runtime.
     ///
     /// # Errors
     /// If the environment asks for what is not possible.
     #[cfg(feature = "otel")]
-    pub(crate) fn start(name: &str) -> Result<Self, CommandFailure> {
+    pub(crate) fn start(name: &'static str) -> Result<Self, CommandFailure> {
         let exporter = otlp::OtlpRecorder::start(name)?.map(Arc::new);
         if let Some(exporter) = &exporter {
             // Set once only, at the start.
@@ -41,7 +42,7 @@ impl Telemetry {
 
     /// Begins nothing: this program is built without the feature `otel`.
     #[cfg(not(feature = "otel"))]
-    pub(crate) fn start(_: &str) -> Result<Self, CommandFailure> {
+    pub(crate) fn start(_: &'static str) -> Result<Self, CommandFailure> {
         Ok(Self {})
     }
 
