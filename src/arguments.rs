@@ -1,8 +1,10 @@
 //! The command line as typed. What it means is decided in [`crate::resolved`].
 
 mod check;
+mod earlier;
 mod inputs;
 mod jobs;
+mod noun;
 mod operators;
 mod realizations;
 pub(crate) mod services;
@@ -18,12 +20,17 @@ use crate::program;
 use crate::wings::{ClusterWing, JobWing, ReportOption, RunPageOption};
 
 pub(crate) use check::CheckArguments;
+pub(crate) use earlier::EarlierCommand;
 pub(crate) use inputs::{CaseFileArguments, JobFileArguments};
 pub(crate) use jobs::{
-    EarlierCommand, ExplainArguments, FetchArguments, JobArguments, JobCommand, PruneArguments,
+    ExplainArguments, FetchArguments, JobArguments, JobCommand, JobListArguments, PruneArguments,
     SubmitArguments, WatchArguments,
 };
-pub(crate) use operators::{BackupArguments, HealthArguments, WorkersArguments, WorkersCommand};
+pub(crate) use noun::Noun;
+pub(crate) use operators::{
+    BackupArguments, CoordinatorCommand, DrainArguments, HealthArguments, UnbanArguments,
+    WorkerCommand, WorkerListArguments,
+};
 pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use tools::{
@@ -60,22 +67,18 @@ pub(crate) enum Command {
     /// Commands of wings.
     #[command(flatten)]
     JobWing(JobWing),
-    /// Run a coordinator: accept jobs from clients and distribute them to workers, until interrupted
-    Coordinator(CoordinatorArguments),
-    /// Run a worker: compute realizations for a coordinator, until interrupted
-    Worker(WorkerArguments),
+    /// Run a coordinator: accept jobs from clients and distribute them to workers, until interrupted.
+    /// With a command: check or copy a running one
+    Coordinator(Noun<CoordinatorArguments, CoordinatorCommand>),
+    /// Run a worker: compute realizations for a coordinator, until interrupted. With a command: list,
+    /// drain and manage the workers of a coordinator
+    Worker(Noun<WorkerArguments, WorkerCommand>),
     /// Submit, list, follow, fetch and cancel the jobs of a coordinator
     #[command(subcommand)]
     Job(JobCommand),
-    /// List the workers of a coordinator
-    Workers(WorkersArguments),
     /// Commands of wings.
     #[command(flatten)]
     ClusterWing(ClusterWing),
-    /// Check whether a coordinator is serving: exit code 0 if it is, otherwise 1
-    Health(HealthArguments),
-    /// Copy the store of a coordinator while it runs
-    Backup(BackupArguments),
     /// Create a certificate authority and certificates for coordinator, workers and clients
     Certs(CertsArguments),
     /// Create an access token and its entry for the coordinator's token list

@@ -1,4 +1,4 @@
-//! The subcommands: one file per command, or per family of commands.
+//! The commands: one file per command, or per family of commands.
 
 mod certs;
 mod check;
@@ -17,91 +17,60 @@ mod simulate;
 mod token;
 mod worker;
 
-use crate::exit_status::{CommandFailure, ExitStatus};
-use crate::resolved::{Resolved, WorkersOperation};
-use crate::signals::unless_interrupted;
+use crate::arguments::{Arguments, Command, Noun};
+use crate::exit_status::CommandFailure;
+use crate::prepared_command::PreparedCommand;
+use crate::process_context::ProcessContext;
 
-/// Executes the command line.
+/// Prepares what the command line asks for.
 ///
 /// # Errors
-/// If the command fails, or was interrupted.
-pub(crate) async fn run(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
-    match left_by_interruption(&resolved) {
-        Some(left) => unless_interrupted(perform(resolved), left).await,
-        None => perform(resolved).await,
-    }
+/// When the environment holds something that cannot be meant.
+pub(crate) fn prepare(arguments: Arguments) -> Result<PreparedCommand, CommandFailure> {
+    prepare_command(arguments.command, &ProcessContext::from_process()?)
 }
 
-/// Returns what is said of what an interrupted command leaves behind; `None` of commands that treat
-/// interruptions themselves, or end at once.
-fn left_by_interruption(resolved: &Resolved) -> Option<&'static str> {
-    match resolved {
-        Resolved::Run { .. }
-        | Resolved::Draw(_)
-        | Resolved::Coordinator(_)
-        | Resolved::Worker { .. }
-        | Resolved::Certs(_)
-        | Resolved::Token(_)
-        | Resolved::Init(_)
-        | Resolved::Schema(_)
-        | Resolved::Materials(_)
-        | Resolved::Completions(_)
-        | Resolved::Man(_) => None,
-        Resolved::Check { .. } | Resolved::Doctor { .. } | Resolved::Health { .. } => {
-            Some("nothing was changed")
+fn prepare_command(
+    command: Command,
+    context: &ProcessContext,
+) -> Result<PreparedCommand, CommandFailure> {
+    let isa = ProcessContext::isa;
+    Ok(match command {
+        Command::Init(arguments) => PreparedCommand::brief(move || init::write(&arguments)),
+        Command::Identify(arguments) => run::prepare_identification(arguments, context)?,
+        Command::Propagate(arguments) => run::prepare_propagation(arguments, context)?,
+        Command::Simulate(arguments) => PreparedCommand::interruptible(
+            "no results were saved",
+            simulate::simulate(arguments, isa()?),
+        ),
+        Command::Check(arguments) => {
+            PreparedCommand::harmless(check::check(arguments, isa()?, context.cores))
         }
-        Resolved::Simulate { .. } => Some("no results were saved"),
-        Resolved::Observe { .. } => Some("no file was written"),
-        Resolved::Job { command, .. } => Some(jobs::left_by_interruption(command)),
-        Resolved::Workers { command, .. } => Some(match command {
-            None => "nothing was changed",
-            Some(WorkersOperation::Drain { .. }) => {
-                "the worker may have been told to drain (see `osteon workers`)"
-            }
-            Some(WorkersOperation::Unban { .. }) => {
-                "the ban may have been lifted (see `osteon workers`)"
-            }
-        }),
-        Resolved::Backup { .. } => Some("no copy was kept"),
-        Resolved::Wing(command) => command.left_by_interruption(),
-    }
-}
-
-async fn perform(resolved: Resolved) -> Result<ExitStatus, CommandFailure> {
-    match resolved {
-        Resolved::Run { run, isa } => run::run(run, isa).await,
-        Resolved::Simulate { arguments, isa } => simulate::simulate(arguments, isa).await,
-        Resolved::Check { arguments, isa, cores } => check::check(arguments, isa, cores).await,
-        Resolved::Draw(arguments) => draw::draw(&arguments),
-        Resolved::Observe { arguments, isa, threads } => {
-            observe::observe(arguments, isa, threads).await
+        Command::Draw(arguments) => PreparedCommand::brief(move || draw::draw(&arguments)),
+        Command::Observe(arguments) => {
+            let observed = observe::observe(arguments, isa()?, context.cores);
+            PreparedCommand::interruptible("no file was written", observed)
         }
-        Resolved::Coordinator(arguments) => coordinator::serve(arguments).await,
-        Resolved::Worker { config, files, unused, .. } => {
-            worker::serve(config, &files, &unused).await
+        Command::JobWing(command) => command.prepare(context)?,
+        Command::Coordinator(Noun::Service(arguments)) => coordinator::prepare(arguments),
+        Command::Coordinator(Noun::Command(command)) => {
+            operators::prepare_for_coordinator(command, context)?
         }
-        Resolved::Certs(arguments) => certs::make(&arguments),
-        Resolved::Token(arguments) => token::make(&arguments),
-        Resolved::Init(arguments) => init::write(&arguments),
-        Resolved::Schema(arguments) => schema::print(&arguments),
-        Resolved::Materials(arguments) => materials::print(&arguments),
-        Resolved::Doctor { patient, format } => doctor::examine(patient, format).await,
-        Resolved::Completions(arguments) => man::completions(&arguments),
-        Resolved::Man(arguments) => man::write(&arguments),
-        Resolved::Job { command, coordinator } => jobs::perform(command, &coordinator).await,
-        Resolved::Workers { command, coordinator, format } => match command {
-            None => operators::workers(&coordinator, format).await,
-            Some(WorkersOperation::Drain { worker }) => {
-                operators::drain(worker, &coordinator, format).await
-            }
-            Some(WorkersOperation::Unban { host }) => operators::unban(&host, &coordinator).await,
-        },
-        Resolved::Health { coordinator, limit, format } => {
-            operators::health(&coordinator, limit, format).await
+        Command::Worker(Noun::Service(arguments)) => worker::prepare(arguments, context)?,
+        Command::Worker(Noun::Command(command)) => operators::prepare_for_worker(command, context)?,
+        Command::Job(command) => jobs::prepare(command, context)?,
+        Command::ClusterWing(command) => command.prepare(context)?,
+        Command::Certs(arguments) => PreparedCommand::brief(move || certs::make(&arguments)),
+        Command::Token(arguments) => PreparedCommand::brief(move || token::make(&arguments)),
+        Command::Materials(arguments) => {
+            PreparedCommand::brief(move || materials::print(&arguments))
         }
-        Resolved::Backup { directory, coordinator, format } => {
-            operators::backup(&directory, &coordinator, format).await
+        Command::Schema(arguments) => PreparedCommand::brief(move || schema::print(&arguments)),
+        Command::Doctor(arguments) => doctor::prepare(arguments, context)?,
+        Command::Completions(arguments) => {
+            PreparedCommand::brief(move || man::completions(&arguments))
         }
-        Resolved::Wing(command) => command.perform().await,
-    }
+        Command::Man(arguments) => PreparedCommand::brief(move || man::write(&arguments)),
+        Command::Earlier(command) => prepare_command(command.into(), context)?,
+    })
 }

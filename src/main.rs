@@ -21,6 +21,7 @@ mod logging;
 mod manual;
 mod new_files;
 mod output;
+mod prepared_command;
 mod process_context;
 mod program;
 mod progress;
@@ -41,7 +42,6 @@ use clap::Parser as _;
 
 use crate::arguments::{Arguments, LogFormat};
 use crate::exit_status::{CommandFailure, ExitStatus};
-use crate::resolved::Resolved;
 use crate::telemetry::Telemetry;
 
 fn main() -> ExitCode {
@@ -59,9 +59,9 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: Arguments, log_format: &mut LogFormat) -> Result<ExitStatus, CommandFailure> {
-    let resolved = Resolved::from_arguments(arguments)?;
-    logging::start(resolved.default_log_level(), resolved.log_format())?;
-    *log_format = resolved.log_format();
+    let command = commands::prepare(arguments)?;
+    logging::start(command.log_level, command.log_format)?;
+    *log_format = command.log_format;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
@@ -71,8 +71,8 @@ fn run(arguments: Arguments, log_format: &mut LogFormat) -> Result<ExitStatus, C
         })?;
     runtime.block_on(async { signals::report_large_files() });
     // Its client needs the runtime, and outlives the command.
-    let telemetry = runtime.block_on(async { Telemetry::start(&resolved) })?;
-    let result = runtime.block_on(commands::run(resolved));
+    let telemetry = runtime.block_on(async { Telemetry::start(command.name) })?;
+    let result = runtime.block_on(command.perform());
     telemetry.end();
     // An abandoned computation may still occupy a thread; its result is not needed.
     runtime.shutdown_background();

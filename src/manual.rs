@@ -45,6 +45,13 @@ pub(crate) fn write(directory: &Path) -> io::Result<()> {
 mod tests {
     use super::*;
 
+    /// Returns the names of the pages of the commands below this one, which is called `name`.
+    fn names(name: &str, command: &clap::Command) -> Vec<String> {
+        let commands = command.get_subcommands().filter(|command| !command.is_hide_set());
+        let named = commands.map(|command| (format!("{name}-{}", command.get_name()), command));
+        named.flat_map(|(name, command)| [names(&name, command), vec![name]].concat()).collect()
+    }
+
     #[test]
     fn every_command_has_a_page_and_is_completed() {
         let directory = tempfile::tempdir().unwrap();
@@ -55,16 +62,14 @@ mod tests {
         assert!(!first.contains("commit"), "{first}");
         let scripts = [Shell::Bash, Shell::Zsh, Shell::Fish].map(completions);
         let definition = definition();
-        let commands = definition.get_subcommands().filter(|command| !command.is_hide_set());
-        let mut count = 0;
-        for command in commands {
-            let name = command.get_name();
-            let page = read(&format!("osteon-{name}.1"));
-            assert!(page.contains("SYNOPSIS"), "{page}");
-            assert!(scripts.iter().all(|script| script.contains(name)), "{name}");
-            count += 1;
+        let names = names("osteon", &definition);
+        for name in &names {
+            assert!(read(&format!("{name}.1")).contains("SYNOPSIS"), "{name}");
+            let word = name.rsplit('-').next().unwrap();
+            assert!(scripts.iter().all(|script| script.contains(word)), "{name}");
         }
-        assert!(count > 20, "{count}");
+        assert!(names.iter().any(|name| name == "osteon-worker-list"), "{names:?}");
+        assert!(names.len() > 30, "{names:?}");
         assert!(read("osteon-identify.1").contains("\\-\\-set"));
         assert!(!directory.path().join("osteon-man.1").exists());
     }

@@ -1,27 +1,14 @@
-//! The command line with environment and defaults resolved; files have not been read yet.
+//! The options of runs with environment and defaults resolved; files have not been read yet.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::time::Duration;
 
-use osteon_client::client::Remote;
-use osteon_client::environment::Unused;
 use osteon_common::job::JobKind;
-use osteon_solver::Isa;
-use osteon_transport::credentials::{CredentialFiles, Credentials};
-use osteon_worker::WorkerConfig;
 
-use crate::arguments::{
-    Arguments, BackupArguments, CertsArguments, CheckArguments, Command, CompletionArguments,
-    CoordinatorArguments, DoctorArguments, DrawArguments, HealthArguments, InitArguments,
-    JobCommand, JobFileArguments, LogFormat, ManArguments, MaterialsArguments, ObserveArguments,
-    ProgressFormat, RunArguments, SchemaArguments, SimulateArguments, TokenArguments,
-    VerbosityArguments, WorkerArguments, WorkersArguments, WorkersCommand,
-};
-use crate::doctor::Patient;
+use crate::arguments::{JobFileArguments, ProgressFormat, RunArguments, VerbosityArguments};
 use crate::exit_status::CommandFailure;
 use crate::process_context::{Locating, ProcessContext, RunLocation, WORKERS_DEFAULT};
-use crate::wings::{ReportOption, WingCommand};
+use crate::wings::ReportOption;
 
 /// Format of the output on stdout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,130 +17,6 @@ pub(crate) enum OutputFormat {
     Text,
     /// JSON for programs.
     Json,
-}
-
-/// The command to be executed.
-#[derive(Debug)]
-pub(crate) enum Resolved {
-    /// `identify`, `propagate`.
-    Run {
-        /// The run.
-        run: Run,
-        /// The instruction set to compute on, on this machine.
-        isa: Option<Isa>,
-    },
-    /// `simulate`.
-    Simulate {
-        /// The case and the requested output.
-        arguments: SimulateArguments,
-        /// The instruction set to compute on.
-        isa: Isa,
-    },
-    /// `check`.
-    Check {
-        /// The job.
-        arguments: CheckArguments,
-        /// The instruction set to compute on.
-        isa: Isa,
-        /// Number of this machine's cores.
-        cores: u32,
-    },
-    /// `draw`.
-    Draw(DrawArguments),
-    /// `observe`.
-    Observe {
-        /// The job and the requested output.
-        arguments: ObserveArguments,
-        /// The instruction set to compute on.
-        isa: Isa,
-        /// Number of threads.
-        threads: u32,
-    },
-    /// `coordinator`.
-    Coordinator(CoordinatorArguments),
-    /// `worker`.
-    Worker {
-        /// Configuration of the worker, still without credentials.
-        config: WorkerConfig,
-        /// The credential files.
-        files: CredentialFiles,
-        /// Environment variables that were not used for its coordinator.
-        unused: Unused,
-        /// Format of its log.
-        log_format: LogFormat,
-    },
-    /// `certs`.
-    Certs(CertsArguments),
-    /// `token`.
-    Token(TokenArguments),
-    /// `init`.
-    Init(InitArguments),
-    /// Print a schema.
-    Schema(SchemaArguments),
-    /// `materials`.
-    Materials(MaterialsArguments),
-    /// `doctor`.
-    Doctor {
-        /// What is examined.
-        patient: Patient,
-        /// Output format.
-        format: OutputFormat,
-    },
-    /// `completions`.
-    Completions(CompletionArguments),
-    /// `man`.
-    Man(ManArguments),
-    /// A command about jobs.
-    Job {
-        /// The command.
-        command: JobCommand,
-        /// The coordinator to ask.
-        coordinator: Remote,
-    },
-    /// `workers`.
-    Workers {
-        /// The operation; without one they are listed.
-        command: Option<WorkersOperation>,
-        /// The coordinator to ask.
-        coordinator: Remote,
-        /// Output format.
-        format: OutputFormat,
-    },
-    /// `health`.
-    Health {
-        /// The coordinator to ask.
-        coordinator: Remote,
-        /// Longest wait for the answer.
-        limit: Duration,
-        /// Output format.
-        format: OutputFormat,
-    },
-    /// `backup`.
-    Backup {
-        /// Directory for the copy.
-        directory: PathBuf,
-        /// The coordinator to ask.
-        coordinator: Remote,
-        /// Output format.
-        format: OutputFormat,
-    },
-    /// A command of a wing.
-    Wing(Box<dyn WingCommand>),
-}
-
-/// An operation on workers.
-#[derive(Debug)]
-pub(crate) enum WorkersOperation {
-    /// Drain a worker.
-    Drain {
-        /// Its number.
-        worker: u64,
-    },
-    /// Lift the ban of a host.
-    Unban {
-        /// Its name.
-        host: String,
-    },
 }
 
 /// One run of a job, from its job file to its result.
@@ -181,170 +44,38 @@ pub(crate) struct Run {
     pub(crate) verbosity: VerbosityArguments,
 }
 
-impl Resolved {
-    /// Resolves `arguments`.
+impl Run {
+    /// Resolves the arguments.
     ///
     /// # Errors
-    /// When the environment holds something that cannot be meant.
-    pub(crate) fn from_arguments(arguments: Arguments) -> Result<Self, CommandFailure> {
-        let context = &ProcessContext::from_process()?;
-        let isa = ProcessContext::isa;
-        Ok(match arguments.command {
-            Command::Identify(arguments) => {
-                run_command(JobKind::Identification, arguments, context)?
-            }
-            Command::Propagate(arguments) => run_command(JobKind::Propagation, arguments, context)?,
-            Command::Simulate(arguments) => Self::Simulate { arguments, isa: isa()? },
-            Command::Check(arguments) => {
-                Self::Check { arguments, isa: isa()?, cores: context.cores }
-            }
-            Command::Draw(arguments) => Self::Draw(arguments),
-            Command::Observe(arguments) => {
-                let threads = arguments.threads.unwrap_or(context.cores);
-                Self::Observe { arguments, isa: isa()?, threads }
-            }
-            Command::JobWing(command) => Self::Wing(command.resolve(context)?),
-            Command::Coordinator(arguments) => Self::Coordinator(arguments),
-            Command::Worker(arguments) => resolve_worker(arguments, context, isa()?)?,
-            Command::Certs(arguments) => Self::Certs(arguments),
-            Command::Token(arguments) => Self::Token(arguments),
-            Command::Init(arguments) => Self::Init(arguments),
-            Command::Schema(arguments) => Self::Schema(arguments),
-            Command::Materials(arguments) => Self::Materials(arguments),
-            Command::Doctor(DoctorArguments { store, client, json }) => {
-                let named =
-                    client.coordinator.is_some() || context.environment.coordinator()?.is_some();
-                let coordinator = named.then(|| context.remote(client)).transpose()?;
-                let patient = Patient { store, coordinator, isa: isa()? };
-                Self::Doctor { patient, format: format(json) }
-            }
-            Command::Completions(arguments) => Self::Completions(arguments),
-            Command::Man(arguments) => Self::Man(arguments),
-            Command::Job(command) => job_command(command, context)?,
-            Command::Earlier(command) => job_command(command.into(), context)?,
-            Command::Workers(arguments) => resolve_workers(arguments, context)?,
-            Command::ClusterWing(command) => Self::Wing(command.resolve(context)?),
-            Command::Health(HealthArguments { client, timeout, json }) => Self::Health {
-                coordinator: context.remote(client)?,
-                limit: Duration::from_secs_f64(timeout),
-                format: format(json),
-            },
-            Command::Backup(BackupArguments { directory, client, json }) => Self::Backup {
-                directory,
-                coordinator: context.remote(client)?,
-                format: format(json),
-            },
+    /// When arguments and environment do not say where.
+    pub(crate) fn resolve(
+        kind: JobKind,
+        arguments: RunArguments,
+        context: &ProcessContext,
+    ) -> Result<Self, CommandFailure> {
+        let RunArguments { job, threads, coordinator, credentials, out, report, .. } = arguments;
+        let page = arguments.page.address();
+        // A page of its own is one of a run on this machine.
+        let workers = arguments.workers.or(page.map(|_| WORKERS_DEFAULT));
+        Ok(Self {
+            kind,
+            job,
+            location: context.locate(Locating { workers, threads, coordinator, credentials })?,
+            name: arguments.name.unwrap_or_default(),
+            out,
+            report,
+            page,
+            format: format(arguments.json),
+            progress: arguments.progress,
+            verbosity: arguments.verbosity,
         })
-    }
-
-    /// Returns the format of the log: only services have a choice.
-    pub(crate) fn log_format(&self) -> LogFormat {
-        match self {
-            Self::Coordinator(arguments) => arguments.log_format,
-            Self::Worker { log_format, .. } => *log_format,
-            _ => LogFormat::Text,
-        }
-    }
-
-    /// Returns the default log level: services log their events, commands only problems.
-    pub(crate) fn default_log_level(&self) -> &'static str {
-        match self {
-            Self::Coordinator(_) | Self::Worker { .. } => "info",
-            Self::Wing(command) => command.default_log_level(),
-            _ => "warn",
-        }
     }
 }
 
 /// Returns JSON or text.
 pub(crate) fn format(json: bool) -> OutputFormat {
     if json { OutputFormat::Json } else { OutputFormat::Text }
-}
-
-fn run_command(
-    kind: JobKind,
-    arguments: RunArguments,
-    context: &ProcessContext,
-) -> Result<Resolved, CommandFailure> {
-    let run = resolve_run(kind, arguments, context)?;
-    // Workers read the variable again, but an invalid value is reported here, at once.
-    let isa = match run.location {
-        RunLocation::Local { .. } => Some(ProcessContext::isa()?),
-        RunLocation::Coordinator(_) => None,
-    };
-    Ok(Resolved::Run { run, isa })
-}
-
-fn resolve_run(
-    kind: JobKind,
-    arguments: RunArguments,
-    context: &ProcessContext,
-) -> Result<Run, CommandFailure> {
-    let RunArguments { job, threads, coordinator, credentials, out, report, .. } = arguments;
-    let page = arguments.page.address();
-    // A page of its own is one of a run on this machine.
-    let workers = arguments.workers.or(page.map(|_| WORKERS_DEFAULT));
-    Ok(Run {
-        kind,
-        job,
-        location: context.locate(Locating { workers, threads, coordinator, credentials })?,
-        name: arguments.name.unwrap_or_default(),
-        out,
-        report,
-        page,
-        format: format(arguments.json),
-        progress: arguments.progress,
-        verbosity: arguments.verbosity,
-    })
-}
-
-fn job_command(command: JobCommand, context: &ProcessContext) -> Result<Resolved, CommandFailure> {
-    let coordinator = context.remote(command.client())?;
-    Ok(Resolved::Job { command, coordinator })
-}
-
-fn resolve_workers(
-    arguments: WorkersArguments,
-    context: &ProcessContext,
-) -> Result<Resolved, CommandFailure> {
-    let WorkersArguments { command, client, json } = arguments;
-    let (command, client, json) = match command {
-        None => (None, client, json),
-        Some(WorkersCommand::Drain(drain)) => {
-            let operation = WorkersOperation::Drain { worker: drain.worker };
-            (Some(operation), drain.client.or(client), json || drain.json)
-        }
-        Some(WorkersCommand::Unban(unban)) => {
-            (Some(WorkersOperation::Unban { host: unban.host }), unban.client.or(client), json)
-        }
-        Some(WorkersCommand::Wing(command)) => {
-            return Ok(Resolved::Wing(command.resolve(context, client)?));
-        }
-    };
-    let (coordinator, format) = (context.remote(client)?, format(json));
-    Ok(Resolved::Workers { command, coordinator, format })
-}
-
-fn resolve_worker(
-    arguments: WorkerArguments,
-    context: &ProcessContext,
-    isa: Isa,
-) -> Result<Resolved, CommandFailure> {
-    let environment = &context.environment;
-    let endpoint = environment.needed(arguments.coordinator)?;
-    let (files, unused) = environment.files(arguments.credentials.into(), &endpoint);
-    let config = WorkerConfig {
-        spans: None,
-        endpoint,
-        credentials: Credentials::default(),
-        host: arguments.host.or_else(|| environment.host()),
-        threads: arguments.threads.unwrap_or(context.cores),
-        isa,
-        give_up_after: arguments.give_up_after.map(Duration::from_secs_f64),
-        time_limit: arguments.time_limit.map(Duration::from_secs_f64),
-        idle_timeout: arguments.idle_timeout.map(Duration::from_secs_f64),
-    };
-    Ok(Resolved::Worker { config, files, unused, log_format: arguments.log_format })
 }
 
 #[cfg(test)]

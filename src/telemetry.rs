@@ -9,7 +9,6 @@ use std::sync::{Arc, OnceLock};
 use osteon_proto::spans::SpanRecorder;
 
 use crate::exit_status::CommandFailure;
-use crate::resolved::Resolved;
 
 static RECORDER: OnceLock<Arc<dyn SpanRecorder>> = OnceLock::new();
 
@@ -26,13 +25,14 @@ pub(crate) struct Telemetry {
 }
 
 impl Telemetry {
-    /// Begins the export, if it is wanted. Must be called within a runtime.
+    /// Begins the export, if it is wanted, under `name` unless the environment gives another one. Must be
+    /// called within a runtime.
     ///
     /// # Errors
     /// If the environment asks for what is not possible.
     #[cfg(feature = "otel")]
-    pub(crate) fn start(resolved: &Resolved) -> Result<Self, CommandFailure> {
-        let exporter = otlp::OtlpRecorder::start(service(resolved))?.map(Arc::new);
+    pub(crate) fn start(name: &'static str) -> Result<Self, CommandFailure> {
+        let exporter = otlp::OtlpRecorder::start(name)?.map(Arc::new);
         if let Some(exporter) = &exporter {
             // Set once only, at the start.
             let _first = RECORDER.set(Arc::<otlp::OtlpRecorder>::clone(exporter));
@@ -42,7 +42,7 @@ impl Telemetry {
 
     /// Begins nothing: this program is built without the feature `otel`.
     #[cfg(not(feature = "otel"))]
-    pub(crate) fn start(_: &Resolved) -> Result<Self, CommandFailure> {
+    pub(crate) fn start(_: &'static str) -> Result<Self, CommandFailure> {
         Ok(Self {})
     }
 
@@ -53,15 +53,5 @@ impl Telemetry {
         if let Some(exporter) = self.exporter {
             exporter.end();
         }
-    }
-}
-
-/// Returns the name of the service, unless the environment gives another one.
-#[cfg(feature = "otel")]
-fn service(resolved: &Resolved) -> &'static str {
-    match resolved {
-        Resolved::Coordinator(_) => "osteon-coordinator",
-        Resolved::Worker { .. } => "osteon-worker",
-        _ => "osteon",
     }
 }

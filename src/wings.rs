@@ -1,13 +1,11 @@
 //! The wings of the program: commands and options that nothing else needs. This is the only file that
 //! names them, and each is left out with its feature.
 
-use std::fmt::Debug;
-use std::pin::Pin;
-
 use clap::Subcommand;
 
 use crate::arguments::ClientArguments;
-use crate::exit_status::{CommandFailure, ExitStatus};
+use crate::exit_status::CommandFailure;
+use crate::prepared_command::PreparedCommand;
 use crate::process_context::ProcessContext;
 
 #[cfg(any(feature = "live", feature = "umbridge"))]
@@ -32,28 +30,6 @@ pub(crate) use self::without::ReportOption;
 #[cfg(not(feature = "live"))]
 pub(crate) use self::without::{PageOptions, RunPageOption};
 
-/// A command of a wing, with environment and defaults resolved.
-pub(crate) trait WingCommand: Debug {
-    /// Returns the default log level.
-    fn default_log_level(&self) -> &'static str {
-        "warn"
-    }
-
-    /// Returns what is said of what an interrupted command leaves behind; `None` if it treats
-    /// interruptions itself, or ends at once.
-    fn left_by_interruption(&self) -> Option<&'static str> {
-        None
-    }
-
-    /// Executes the command.
-    fn perform(self: Box<Self>) -> Performance;
-}
-
-/// The execution of a command.
-pub(crate) type Performance = Pin<Box<dyn Future<Output = Result<ExitStatus, CommandFailure>>>>;
-
-type ResolvedWing = Result<Box<dyn WingCommand>, CommandFailure>;
-
 /// Commands about a job and its results.
 #[derive(Debug, Subcommand)]
 pub(crate) enum JobWing {
@@ -73,9 +49,9 @@ pub(crate) enum ClusterWing {
     Slurm(slurm::SlurmArguments),
 }
 
-/// Operations on workers.
+/// Commands about workers.
 #[derive(Debug, Subcommand)]
-pub(crate) enum WorkersWing {
+pub(crate) enum WorkerWing {
     /// Submit workers to Slurm as long as jobs wait for them, until interrupted
     ///
     /// Workers end by themselves when they have had no work for the idle timeout. Those that wait in
@@ -85,36 +61,64 @@ pub(crate) enum WorkersWing {
 }
 
 impl JobWing {
-    /// Resolves the arguments.
+    /// Prepares the command.
+    ///
+    /// # Errors
+    /// When arguments and environment do not say enough.
     #[cfg_attr(not(feature = "umbridge"), expect(unused_variables, reason = "a report needs none"))]
-    pub(crate) fn resolve(self, context: &ProcessContext) -> ResolvedWing {
+    pub(crate) fn prepare(
+        self,
+        context: &ProcessContext,
+    ) -> Result<PreparedCommand, CommandFailure> {
         match self {
             #[cfg(feature = "report")]
-            Self::Report(arguments) => Ok(Box::new(arguments)),
+            Self::Report(arguments) => {
+                Ok(PreparedCommand::brief(move || report::report(&arguments)))
+            }
             #[cfg(feature = "umbridge")]
-            Self::Umbridge(arguments) => umbridge::resolve(*arguments, context),
+            Self::Umbridge(arguments) => umbridge::prepare(*arguments, context),
         }
     }
 }
 
 impl ClusterWing {
-    /// Resolves the arguments.
+    /// Prepares the command.
+    ///
+    /// # Errors
+    /// When arguments and environment do not say enough.
     #[cfg_attr(not(feature = "slurm"), expect(unused_variables, reason = "there is no command"))]
-    pub(crate) fn resolve(self, context: &ProcessContext) -> ResolvedWing {
+    pub(crate) fn prepare(
+        self,
+        context: &ProcessContext,
+    ) -> Result<PreparedCommand, CommandFailure> {
         match self {
             #[cfg(feature = "slurm")]
-            Self::Slurm(arguments) => slurm::resolve(arguments, context),
+            Self::Slurm(arguments) => slurm::prepare(arguments, context),
         }
     }
 }
 
-impl WorkersWing {
-    /// Resolves the arguments; `client` is what stands before the operation.
-    #[cfg_attr(not(feature = "slurm"), expect(unused_variables, reason = "there is no operation"))]
-    pub(crate) fn resolve(self, context: &ProcessContext, client: ClientArguments) -> ResolvedWing {
+impl WorkerWing {
+    /// Returns what says where the coordinator is.
+    pub(crate) fn client_mut(&mut self) -> &mut ClientArguments {
+        match *self {
+            #[cfg(feature = "slurm")]
+            Self::Slurm(ref mut arguments) => &mut arguments.client,
+        }
+    }
+
+    /// Prepares the command.
+    ///
+    /// # Errors
+    /// When arguments and environment do not say enough.
+    #[cfg_attr(not(feature = "slurm"), expect(unused_variables, reason = "there is no command"))]
+    pub(crate) fn prepare(
+        self,
+        context: &ProcessContext,
+    ) -> Result<PreparedCommand, CommandFailure> {
         match self {
             #[cfg(feature = "slurm")]
-            Self::Slurm(arguments) => slurm::resolve_scaling(*arguments, context, client),
+            Self::Slurm(arguments) => slurm::prepare_scaling(*arguments, context),
         }
     }
 }

@@ -57,22 +57,25 @@ ended with a result, 1 if it failed or was cancelled, 2 on bad usage or bad inpu
 /// What was written for an earlier version goes on.
 #[test]
 fn earlier_names_of_commands_say_the_new_ones() {
-    for (earlier, name) in [
-        ("submit", "submit"),
-        ("jobs", "list"),
-        ("watch", "watch"),
-        ("explain", "explain"),
-        ("cancel", "cancel"),
-        ("fetch", "fetch"),
-        ("recheck", "recheck"),
+    for (earlier, noun, name) in [
+        ("submit", "job", "submit"),
+        ("jobs", "job", "list"),
+        ("watch", "job", "watch"),
+        ("explain", "job", "explain"),
+        ("cancel", "job", "cancel"),
+        ("fetch", "job", "fetch"),
+        ("recheck", "job", "recheck"),
+        ("workers", "worker", "list"),
+        ("health", "coordinator", "health"),
+        ("backup", "coordinator", "backup"),
     ] {
         let help = run(&[earlier, "-h"]).succeeded().to_owned();
-        assert!(help.starts_with(&format!("Same as `osteon job {name}`")), "{help}");
+        assert!(help.starts_with(&format!("Same as `osteon {noun} {name}`")), "{help}");
         let options = |help: &str| {
             let options = help.split_once("\nOptions:\n").unwrap().1;
             options.split_once("  -h, --help").unwrap().0.to_owned()
         };
-        let new = run(&["job", name, "-h"]).succeeded().to_owned();
+        let new = run(&[noun, name, "-h"]).succeeded().to_owned();
         assert_eq!(options(&help), options(&new), "{earlier}");
     }
 }

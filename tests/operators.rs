@@ -45,9 +45,9 @@ fn an_operator_sees_the_workers_and_sends_one_away() {
     let scratch = Scratch::new();
     let file = scratch.write("job.toml", &job(2000, 400));
     let coordinator = Coordinator::start(&scratch.path("store"));
-    assert_eq!(coordinator.client(&["workers"]).succeeded(), "no workers\n");
+    assert_eq!(coordinator.client(&["worker", "list"]).succeeded(), "no workers\n");
     let mut first = coordinator.worker(1);
-    let listed = || coordinator.client(&["workers", "--json"]).json();
+    let listed = || coordinator.client(&["worker", "list", "--json"]).json();
     eventually("a worker is attached", || listed()["workers"][0]["state"] == "ok");
     let _second = coordinator.worker(2);
     coordinator.submit(&file);
@@ -62,12 +62,12 @@ fn an_operator_sees_the_workers_and_sends_one_away() {
     assert_eq!(workers[0]["version"], env!("CARGO_PKG_VERSION"));
     assert!(is_recent(&workers[0]["attached"]), "{workers}");
     assert!(workers[0]["silent_s"].as_f64() < Some(60.0), "{workers}");
-    let table = coordinator.client(&["workers"]).succeeded().to_owned();
+    let table = coordinator.client(&["worker", "list"]).succeeded().to_owned();
     assert!(table.starts_with("NUMBER") && table.contains("STATE"), "{table}");
     assert_eq!(table.lines().count(), 3, "{table}");
 
     let number = workers[0]["number"].to_string();
-    let drained = coordinator.client(&["workers", "drain", &number, "--json"]).json();
+    let drained = coordinator.client(&["worker", "drain", &number, "--json"]).json();
     assert_eq!(drained["state"], "draining");
     // It ends as if its own user had asked it to, and nobody is blamed.
     assert_eq!(first.code(), Some(0));
@@ -76,7 +76,7 @@ fn an_operator_sees_the_workers_and_sends_one_away() {
     assert_eq!((&gone["number"], &gone["batches"]), (&workers[0]["number"], &0.into()));
     assert!(gone["reason"].as_str().unwrap().contains("drained"), "{gone}");
     assert!(is_recent(&gone["departed"]), "{gone}");
-    let unknown = coordinator.client(&["workers", "drain", &number]);
+    let unknown = coordinator.client(&["worker", "drain", &number]);
     assert_eq!(unknown.code, Some(2), "{unknown:?}");
     assert!(unknown.stderr.contains(&format!("no worker with number {number}")), "{unknown:?}");
 }
@@ -201,7 +201,7 @@ fn a_probe_learns_from_the_exit_code_whether_a_coordinator_serves() {
     let url = secure.url.clone();
     // Works without a token, and with one that cannot be read.
     let health = |options: &[&str]| {
-        let own = ["health", "--coordinator", &url, "--tls-ca", text(&ca)];
+        let own = ["coordinator", "health", "--coordinator", &url, "--tls-ca", text(&ca)];
         run_with(("OSTEON_TOKEN_FILE", "/nonexistent"), &[&own, options].concat())
     };
     assert_eq!(health(&[]).succeeded(), "serving\n");
@@ -232,21 +232,21 @@ fn a_backup_of_a_running_coordinator_is_a_store_to_go_on_from() {
     let id = coordinator.submit(&file);
     eventually("the job is under way", || coordinator.job(&id)["evaluations"].as_u64() > Some(2));
     let copy = scratch.path("copy/of/monday");
-    let made = coordinator.client(&["backup", text(&copy), "--json"]).json();
+    let made = coordinator.client(&["coordinator", "backup", text(&copy), "--json"]).json();
     let bytes = fs::metadata(copy.join("osteon.sqlite")).unwrap().len();
     assert_eq!(made["bytes"], bytes);
     assert_eq!(fs::read_dir(&copy).unwrap().count(), 1, "something else is left there");
     assert!(!scratch.path("store/osteon.backup").exists());
     // An existing file is never replaced.
     let before = fs::read(copy.join("osteon.sqlite")).unwrap();
-    let again = coordinator.client(&["backup", text(&copy)]);
+    let again = coordinator.client(&["coordinator", "backup", text(&copy)]);
     assert_eq!(again.code, Some(2), "{again:?}");
     assert!(again.stderr.contains("already exists"), "{again:?}");
     assert_eq!(fs::read(copy.join("osteon.sqlite")).unwrap(), before);
     // Nor is a copy combined with another store's journal.
     let beside = scratch.path("beside");
     scratch.write("beside/osteon.sqlite-wal", "of another store");
-    assert_eq!(coordinator.client(&["backup", text(&beside)]).code, Some(2));
+    assert_eq!(coordinator.client(&["coordinator", "backup", text(&beside)]).code, Some(2));
 
     let digest = undisturbed("identify", &file);
     let ended = |coordinator: &Coordinator| {
@@ -267,14 +267,45 @@ fn a_backup_of_a_running_coordinator_is_a_store_to_go_on_from() {
 }
 
 #[test]
+fn earlier_names_of_commands_do_the_same() {
+    let scratch = Scratch::new();
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    for (earlier, new) in [
+        (&["jobs"][..], &["job", "list"][..]),
+        (&["jobs", "prune"], &["job", "prune"]),
+        (&["workers"], &["worker", "list"]),
+        (&["workers", "--json"], &["worker", "list", "--json"]),
+        (&["health"], &["coordinator", "health"]),
+    ] {
+        let new = coordinator.client(new).succeeded().to_owned();
+        assert_eq!(coordinator.client(earlier).succeeded(), new, "{earlier:?}");
+    }
+    for (earlier, new) in [
+        (&["workers", "drain", "7"][..], &["worker", "drain", "7"][..]),
+        (&["workers", "unban", "a"], &["worker", "unban", "a"]),
+        (
+            &["backup", text(&scratch.path("store"))],
+            &["coordinator", "backup", text(&scratch.path("store"))],
+        ),
+    ] {
+        let (earlier, new) = (coordinator.client(earlier), coordinator.client(new));
+        assert_eq!((earlier.code, &earlier.stderr), (new.code, &new.stderr));
+        assert_eq!(earlier.code, Some(2), "{earlier:?}");
+    }
+    let copy = scratch.path("copy");
+    coordinator.client(&["backup", text(&copy)]).succeeded();
+    assert!(copy.join("osteon.sqlite").exists());
+}
+
+#[test]
 fn a_store_is_copied_for_admins_only() {
     let secure = Secure::start();
     let copy = secure.scratch.path("copy");
-    let refused = secure.client("submit", &["backup", text(&copy)]);
+    let refused = secure.client("submit", &["coordinator", "backup", text(&copy)]);
     assert_eq!(refused.code, Some(1), "{refused:?}");
     assert!(refused.stderr.contains("this needs role admin"), "{refused:?}");
     assert!(!copy.join("osteon.sqlite").exists());
-    secure.client("admin", &["backup", text(&copy)]).succeeded();
+    secure.client("admin", &["coordinator", "backup", text(&copy)]).succeeded();
     assert!(copy.join("osteon.sqlite").exists());
 }
 
@@ -356,7 +387,8 @@ fn the_environment_names_what_every_command_repeats() {
     command.env("OSTEON_TLS_CERT", &files[0]).env("OSTEON_TLS_KEY", &files[1]);
     let _worker = Owned::spawn_logging(&mut command, &scratch.path("worker.log"));
     eventually("the worker is attached", || {
-        with(&own, &["workers", "--json"]).json()["workers"].as_array().map(Vec::len) == Some(1)
+        with(&own, &["worker", "list", "--json"]).json()["workers"].as_array().map(Vec::len)
+            == Some(1)
     });
     // A run on this machine ignores them.
     let nowhere = Path::new("/nonexistent");
@@ -393,7 +425,11 @@ fn files_of_the_environment_are_not_used_for_another_coordinator() {
     let every = "OSTEON_TLS_CA, OSTEON_TLS_CERT, OSTEON_TLS_KEY, OSTEON_TOKEN_FILE were not used";
     let why = "is not the one that OSTEON_COORDINATOR names";
     check(&jobs, 2, &["needs --tls-ca FILE", every, why]);
-    check(&["health", "--coordinator", &secure.url], 2, &["needs --tls-ca FILE", every, why]);
+    check(
+        &["coordinator", "health", "--coordinator", &secure.url],
+        2,
+        &["needs --tls-ca FILE", every, why],
+    );
     let with_ca = [&jobs[..], &["--tls-ca", text(&ca)]].concat();
     check(
         &with_ca,

@@ -199,7 +199,7 @@ fn wrong_options_are_refused_before_anything_waits_for_nodes() {
     let count = ["--count", "2"];
     check(&[&array, &url, &count, &["--time-limit", "1min"]], "it must be at least 2min");
     check(&[&array, &url, &count, &["--stagger", "40min"]], "at most half of --time-limit, 1800 s");
-    let scaling = ["workers", "slurm", "--min", "3", "--max", "2"];
+    let scaling = ["worker", "slurm", "--min", "3", "--max", "2"];
     check(&[&scaling, &url], "--min 3 must not be larger than --max 2");
 }
 
@@ -244,7 +244,7 @@ fn over_tls_the_environment_names_all_that_workers_need() {
         command.args(words).args(["--cpus-per-worker", "1"]).envs(variables.clone());
         Finished::of(stage.with(&mut command).output().unwrap()).succeeded().to_owned()
     };
-    let told = print(&["workers", "slurm", "--min", "1", "--max", "2", "--dry-run"]);
+    let told = print(&["worker", "slurm", "--min", "1", "--max", "2", "--dry-run"]);
     assert!(told.contains("1 workers would be submitted"), "{told}");
     let script = print(&["slurm", "array", "--count", "1", "--idle-timeout", "1s"]);
     assert!(!script.contains(text(&read)), "workers need no token: {script}");
@@ -263,7 +263,7 @@ fn over_tls_the_environment_names_all_that_workers_need() {
 fn workers_are_submitted_when_jobs_wait_and_a_refusal_is_not_repeated_at_once() {
     let stage = Stage::new();
     let coordinator = Coordinator::start(&stage.path("store"));
-    let words = ["workers", "slurm", "--max", "5", "--cpus-per-worker", "2", "--interval", "1"];
+    let words = ["worker", "slurm", "--max", "5", "--cpus-per-worker", "2", "--interval", "1"];
     let words = [&words[..], &["--coordinator", &coordinator.url]].concat();
     let dry = || {
         let mut command = osteon();
@@ -324,7 +324,7 @@ fn workers_are_submitted_when_jobs_wait_and_a_refusal_is_not_repeated_at_once() 
 #[test]
 fn without_slurm_or_coordinator_the_error_says_so() {
     let stage = Stage::new();
-    let words = ["workers", "slurm", "--max", "5", "--cpus-per-worker", "2", "--coordinator"];
+    let words = ["worker", "slurm", "--max", "5", "--cpus-per-worker", "2", "--coordinator"];
     let words = [&words[..], &["http://127.0.0.1:1"]].concat();
     let mut command = osteon();
     let output = command.args(&words).env("PATH", stage.path("nothing")).output().unwrap();

@@ -123,7 +123,7 @@ impl Peer {
 fn hint(status: &Status) -> &'static str {
     match status::missing(status) {
         Some(Resource::Job) => "; `osteon job list` lists all jobs",
-        Some(Resource::Worker) => "; `osteon workers` lists all that are attached",
+        Some(Resource::Worker) => "; `osteon worker list` lists all that are attached",
         // The refusal says it.
         Some(Resource::Host) => "",
         None => "",

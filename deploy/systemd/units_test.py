@@ -134,7 +134,7 @@ class Relied(unittest.TestCase):
         options = "--threads 1"
         variables = environment("worker", OSTEON_COORDINATOR=url, OSTEON_WORKER_OPTIONS=options)
         worker = self.start("osteon-worker", command("osteon-worker", variables), variables)
-        wait_for("attachment", lambda: '"state": "ok"' in output(OSTEON, "workers", "--json", "--coordinator", url))
+        wait_for("attachment", lambda: '"state": "ok"' in output(OSTEON, "worker", "list", "--json", "--coordinator", url))
         return worker
 
     def test_the_installed_settings_are_those_of_one_machine(self):
@@ -148,7 +148,7 @@ class Relied(unittest.TestCase):
         self.assertEqual(unit("osteon-worker")["Service"]["Restart"], "on-failure")
         _, url = self.start_coordinator()
         worker = self.start_worker(url)
-        output(OSTEON, "workers", "drain", "1", "--coordinator", url)
+        output(OSTEON, "worker", "drain", "1", "--coordinator", url)
         self.assertEqual(worker.process.wait(timeout=60), 0, worker.text())
 
     def test_both_end_with_0_when_they_are_stopped_in_time(self):

@@ -1,5 +1,5 @@
 # One worker on one node, for a coordinator that runs elsewhere. `osteon slurm array` prints this
-# below the settings, and `osteon workers slurm` submits it.
+# below the settings, and `osteon worker slurm` submits it.
 
 set -euo pipefail
 

@@ -209,7 +209,7 @@ def workers_follow_the_queue_of_jobs(slurm, osteon, work):
     file = write_job(work, "short", FEW)
     with coordinator(osteon, work) as url:
         words = (
-            "workers", "slurm", "--max", 3, "--cpus-per-worker", 1, "--idle-timeout", "2s",
+            "worker", "slurm", "--max", 3, "--cpus-per-worker", 1, "--idle-timeout", "2s",
             "--interval", 1, "--time-limit", "5min", "--coordinator", url,
         )  # fmt: skip
         known = set(slurm.jobs())

@@ -31,68 +31,6 @@ pub(crate) enum JobCommand {
     Prune(PruneArguments),
 }
 
-impl JobCommand {
-    /// Returns what says where the coordinator is.
-    pub(crate) fn client(&self) -> ClientArguments {
-        let client = match self {
-            Self::Submit(SubmitArguments { client, .. })
-            | Self::List(JobListArguments { client, .. })
-            | Self::Watch(WatchArguments { job: JobArguments { client, .. }, .. })
-            | Self::Explain(ExplainArguments { client, .. })
-            | Self::Cancel(JobArguments { client, .. })
-            | Self::Fetch(FetchArguments { client, .. })
-            | Self::Recheck(WatchArguments { job: JobArguments { client, .. }, .. })
-            | Self::Prune(PruneArguments { client, .. }) => client,
-        };
-        client.clone()
-    }
-}
-
-/// The commands about jobs by the names that they had before; they do the same.
-#[derive(Debug, Subcommand)]
-pub(crate) enum EarlierCommand {
-    /// Same as `osteon job submit`
-    #[command(hide = true)]
-    Submit(SubmitArguments),
-    /// Same as `osteon job list`
-    #[command(hide = true)]
-    Jobs(JobsArguments),
-    /// Same as `osteon job watch`
-    #[command(hide = true)]
-    Watch(WatchArguments),
-    /// Same as `osteon job explain`
-    #[command(hide = true)]
-    Explain(ExplainArguments),
-    /// Same as `osteon job cancel`
-    #[command(hide = true)]
-    Cancel(JobArguments),
-    /// Same as `osteon job fetch`
-    #[command(hide = true)]
-    Fetch(FetchArguments),
-    /// Same as `osteon job recheck`
-    #[command(hide = true)]
-    Recheck(WatchArguments),
-}
-
-impl From<EarlierCommand> for JobCommand {
-    fn from(earlier: EarlierCommand) -> Self {
-        match earlier {
-            EarlierCommand::Submit(arguments) => Self::Submit(arguments),
-            EarlierCommand::Jobs(JobsArguments { command: None, list }) => Self::List(list),
-            EarlierCommand::Jobs(JobsArguments { command: Some(command), list }) => {
-                let JobsCommand::Prune(prune) = command;
-                let (client, json) = (prune.client.or(list.client), prune.json || list.json);
-                Self::Prune(PruneArguments { client, json, ..prune })
-            }
-            EarlierCommand::Watch(arguments) => Self::Watch(arguments),
-            EarlierCommand::Explain(arguments) => Self::Explain(arguments),
-            EarlierCommand::Cancel(arguments) => Self::Cancel(arguments),
-            EarlierCommand::Fetch(arguments) => Self::Fetch(arguments),
-            EarlierCommand::Recheck(arguments) => Self::Recheck(arguments),
-        }
-    }
-}
-
 /// Arguments of `submit`.
 #[derive(Debug, Args)]
 pub(crate) struct SubmitArguments {
@@ -130,24 +68,6 @@ pub(crate) struct JobListArguments {
     /// Print the output as JSON
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-/// Arguments of `jobs`, the earlier name of `job list`.
-#[derive(Debug, Args)]
-pub(crate) struct JobsArguments {
-    /// The operation; without one they are listed.
-    #[command(subcommand)]
-    pub(crate) command: Option<JobsCommand>,
-    /// What is listed.
-    #[command(flatten)]
-    pub(crate) list: JobListArguments,
-}
-
-/// Operations of `jobs`.
-#[derive(Debug, Subcommand)]
-pub(crate) enum JobsCommand {
-    /// Delete ended jobs (without options, all of them) and print their ids
-    Prune(PruneArguments),
 }
 
 /// Arguments of `job prune`.

@@ -5,14 +5,46 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{ClientArguments, probe_seconds};
-use crate::wings::WorkersWing;
+use crate::wings::WorkerWing;
 
-/// Arguments of `workers`.
+/// The commands about workers.
+#[derive(Debug, Subcommand)]
+pub(crate) enum WorkerCommand {
+    /// List the workers of a coordinator
+    List(WorkerListArguments),
+    /// Drain a worker: it receives no new batches, completes or returns those it holds, and exits
+    Drain(DrainArguments),
+    /// Lift the ban of a host whose machine has been repaired, so that its workers may attach again
+    Unban(UnbanArguments),
+    /// Commands of wings.
+    #[command(flatten)]
+    Wing(WorkerWing),
+}
+
+/// The commands about a running coordinator.
+#[derive(Debug, Subcommand)]
+pub(crate) enum CoordinatorCommand {
+    /// Check whether a coordinator is serving: exit code 0 if it is, otherwise 1
+    Health(HealthArguments),
+    /// Copy the store of a coordinator while it runs
+    Backup(BackupArguments),
+}
+
+impl WorkerCommand {
+    /// Returns what says where the coordinator is.
+    pub(super) fn client_mut(&mut self) -> &mut ClientArguments {
+        match self {
+            Self::List(WorkerListArguments { client, .. })
+            | Self::Drain(DrainArguments { client, .. })
+            | Self::Unban(UnbanArguments { client, .. }) => client,
+            Self::Wing(command) => command.client_mut(),
+        }
+    }
+}
+
+/// Arguments of `worker list`.
 #[derive(Debug, Args)]
-pub(crate) struct WorkersArguments {
-    /// The operation; without one they are listed.
-    #[command(subcommand)]
-    pub(crate) command: Option<WorkersCommand>,
+pub(crate) struct WorkerListArguments {
     /// The coordinator.
     #[command(flatten)]
     pub(crate) client: ClientArguments,
@@ -21,22 +53,10 @@ pub(crate) struct WorkersArguments {
     pub(crate) json: bool,
 }
 
-/// Operations on workers.
-#[derive(Debug, Subcommand)]
-pub(crate) enum WorkersCommand {
-    /// Drain a worker: it receives no new batches, completes or returns those it holds, and exits
-    Drain(DrainArguments),
-    /// Lift the ban of a host whose machine has been repaired, so that its workers may attach again
-    Unban(UnbanArguments),
-    /// Operations of wings.
-    #[command(flatten)]
-    Wing(WorkersWing),
-}
-
-/// Arguments of `workers unban`.
+/// Arguments of `worker unban`.
 #[derive(Debug, Args)]
 pub(crate) struct UnbanArguments {
-    /// The host, as `osteon workers` lists it
+    /// The host, as `osteon worker list` lists it
     #[arg(value_name = "HOST")]
     pub(crate) host: String,
     /// The coordinator.
@@ -44,10 +64,10 @@ pub(crate) struct UnbanArguments {
     pub(crate) client: ClientArguments,
 }
 
-/// Arguments of `workers drain`.
+/// Arguments of `worker drain`.
 #[derive(Debug, Args)]
 pub(crate) struct DrainArguments {
-    /// Number of the worker, as `osteon workers` lists it
+    /// Number of the worker, as `osteon worker list` lists it
     #[arg(value_name = "NUMBER")]
     pub(crate) worker: u64,
     /// The coordinator.
@@ -58,7 +78,7 @@ pub(crate) struct DrainArguments {
     pub(crate) json: bool,
 }
 
-/// Arguments of `health`.
+/// Arguments of `coordinator health`.
 #[derive(Debug, Args)]
 pub(crate) struct HealthArguments {
     /// The coordinator.
@@ -72,7 +92,7 @@ pub(crate) struct HealthArguments {
     pub(crate) json: bool,
 }
 
-/// Arguments of `backup`.
+/// Arguments of `coordinator backup`.
 #[derive(Debug, Args)]
 pub(crate) struct BackupArguments {
     /// Directory in which the copy is written as osteon.sqlite; that file must not exist

@@ -65,14 +65,51 @@ fn what_cannot_be_meant_is_refused() {
     let long = "n".repeat(257);
     check(&format!("osteon job submit a.toml --name {long}"), "at most 256 bytes");
     check("osteon identify a.toml --name a\u{7}b", "no control characters");
-    check("osteon health --timeout 0", "from 0.1 to 60");
-    check("osteon health --timeout 61", "from 0.1 to 60");
-    check("osteon workers drain one", "invalid digit");
-    check("osteon backup", "<DIR>");
+    check("osteon coordinator health --timeout 0", "from 0.1 to 60");
+    check("osteon coordinator health --timeout 61", "from 0.1 to 60");
+    check("osteon worker drain one", "invalid digit");
+    check("osteon coordinator backup", "<DIR>");
+    check("osteon coordinator --store s health", "'health'");
+    check("osteon worker --threads 1 list", "'list'");
+    check("osteon worker lists", "'lists'");
     check("osteon job fetch 1 --coordinator unix:a", "--out");
     check("osteon report", "<DIR>...");
     check("osteon frobnicate", "unrecognized subcommand");
     check("osteon", "Usage");
+}
+
+#[test]
+fn words_of_services_run_them_or_ask_them() {
+    let parse = |line: &str| Arguments::try_parse_from(line.split_whitespace()).unwrap().command;
+    let service = parse("osteon worker");
+    assert!(matches!(service, Command::Worker(Noun::Service(_))), "{service:?}");
+    let service = parse("osteon coordinator --listen a:1 --store s");
+    assert!(matches!(service, Command::Coordinator(Noun::Service(_))), "{service:?}");
+    let list = worker(parse("osteon worker list --json"));
+    assert!(matches!(&list, WorkerCommand::List(list) if list.json), "{list:?}");
+    let health = parse("osteon coordinator health");
+    assert!(matches!(health, Command::Coordinator(Noun::Command(_))), "{health:?}");
+}
+
+fn worker(command: Command) -> WorkerCommand {
+    match command {
+        Command::Worker(Noun::Command(command)) => command,
+        Command::Earlier(command) => worker(command.into()),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn options_before_an_operation_on_workers_go_on() {
+    for line in [
+        "osteon workers --coordinator unix:a --json drain 3",
+        "osteon workers --coordinator unix:b drain 3 --coordinator unix:a --json",
+    ] {
+        let parsed = Arguments::try_parse_from(line.split_whitespace()).unwrap().command;
+        let WorkerCommand::Drain(drain) = worker(parsed) else { panic!("{line}") };
+        assert_eq!((drain.worker, drain.json), (3, true), "{line}");
+        assert_eq!(drain.client.coordinator.unwrap().to_string(), "unix:a", "{line}");
+    }
 }
 
 #[test]

@@ -14,6 +14,7 @@ use crate::certificates::{Authority, CertificateHolder, PemPair};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::new_files::{self, NewFile};
 use crate::output;
+use crate::prepared_command::Ended;
 use crate::resolved::OutputFormat;
 
 /// Base name of the authority's files.
@@ -21,7 +22,7 @@ const AUTHORITY: &str = "ca";
 
 /// Writes `NAME.pem` and `NAME-key.pem` for the authority, the coordinator (`server`), workers
 /// (`worker`) and clients (`client`); prints their names.
-pub(super) fn make(arguments: &CertsArguments) -> Result<ExitStatus, CommandFailure> {
+pub(super) fn make(arguments: &CertsArguments) -> Ended {
     let CertsArguments { directory, host, days, ca } = arguments;
     if let Some(wrong) = host.iter().find(|host| !endpoint::is_host(host)) {
         return Err(CommandFailure::bad_input(anyhow!(

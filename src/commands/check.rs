@@ -7,15 +7,12 @@ use osteon_solver::Isa;
 use crate::arguments::CheckArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output::{self, ShownCost};
+use crate::prepared_command::Ended;
 use crate::{resolved, unsearched_groups, warnings};
 use osteon_local::cost::{Effort, JobCost};
 
 /// Checks the job, and prints what it will do and cost.
-pub(super) async fn check(
-    arguments: CheckArguments,
-    isa: Isa,
-    cores: u32,
-) -> Result<ExitStatus, CommandFailure> {
+pub(super) async fn check(arguments: CheckArguments, isa: Isa, cores: u32) -> Ended {
     let CheckArguments { job, propagate, json } = arguments;
     let input = job.open().map_err(CommandFailure::bad_input)?;
     let kind = match job_file::purpose(&input).map_err(CommandFailure::bad_input)? {

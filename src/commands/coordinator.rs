@@ -15,6 +15,7 @@ use crate::arguments::CoordinatorArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::listener_security::ListenerSecurity;
 use crate::output;
+use crate::prepared_command::{Ended, PreparedCommand};
 use crate::program;
 use crate::resolved::OutputFormat;
 use crate::signals;
@@ -23,10 +24,15 @@ use crate::telemetry;
 /// Heartbeats within the duration of a lease; several, because some may come late.
 const HEARTBEATS_PER_LEASE: u32 = 5;
 
+/// Prepares a coordinator.
+pub(super) fn prepare(arguments: CoordinatorArguments) -> PreparedCommand {
+    PreparedCommand::service("osteon-coordinator", arguments.log_format, serve(arguments))
+}
+
 /// Serves until SIGINT or SIGTERM, or until a part of it has ended unexpectedly. The URL in use is
 /// printed, and stands in DIR/address; those of the metrics and the live page stand in
 /// DIR/metrics-address and DIR/http-address.
-pub(super) async fn serve(arguments: CoordinatorArguments) -> Result<ExitStatus, CommandFailure> {
+async fn serve(arguments: CoordinatorArguments) -> Ended {
     let address: ListenAddress = arguments.listen.parse().map_err(CommandFailure::bad_input)?;
     // Read before anything is bound or created.
     let security = ListenerSecurity::from_arguments(&arguments, &address)?;

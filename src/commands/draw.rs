@@ -9,10 +9,11 @@ use crate::arguments::DrawArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::job_point;
 use crate::output;
+use crate::prepared_command::Ended;
 use crate::resolved::OutputFormat;
 
 /// Prints the case file.
-pub(super) fn draw(arguments: &DrawArguments) -> Result<ExitStatus, CommandFailure> {
+pub(super) fn draw(arguments: &DrawArguments) -> Ended {
     let input = arguments.job.open().map_err(CommandFailure::bad_input)?;
     let noted =
         job_file::of_input(&input, JobKind::Propagation).map_err(CommandFailure::bad_input)?;

@@ -13,6 +13,7 @@ use crate::arguments::InitArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::new_files::{self, NewFile};
 use crate::output;
+use crate::prepared_command::Ended;
 use crate::progress::say;
 use crate::resolved::OutputFormat;
 
@@ -20,7 +21,7 @@ use crate::resolved::OutputFormat;
 const UNNAMED: &str = "job.toml";
 
 /// Writes the job file, says what was understood, and whether the job can be run as it is.
-pub(super) fn write(arguments: &InitArguments) -> Result<ExitStatus, CommandFailure> {
+pub(super) fn write(arguments: &InitArguments) -> Ended {
     let InitArguments { velocities, out } = arguments;
     let is_printed = out.as_deref() == Some(Path::new("-"));
     let path = match (out, velocities) {

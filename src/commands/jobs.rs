@@ -1,6 +1,6 @@
 //! `osteon job …`: requests to a running coordinator.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
@@ -17,11 +17,13 @@ use osteon_proto::v1::JobSnapshot;
 use tonic::Code;
 
 use crate::arguments::{
-    ExplainArguments, FetchArguments, JobArguments, JobCommand, PruneArguments, SubmitArguments,
-    WatchArguments,
+    ExplainArguments, FetchArguments, JobArguments, JobCommand, JobListArguments, PruneArguments,
+    SubmitArguments, WatchArguments,
 };
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
+use crate::prepared_command::{Ended, PreparedCommand};
+use crate::process_context::ProcessContext;
 use crate::progress::say;
 use crate::resolved::{OutputFormat, format};
 use crate::user;
@@ -30,47 +32,53 @@ use crate::{unsearched_groups, warnings};
 /// Shortest time between two lines of `watch`.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Returns what is said of what an interrupted command leaves behind.
-pub(super) fn left_by_interruption(command: &JobCommand) -> &'static str {
-    match command {
-        JobCommand::List(_) | JobCommand::Explain(_) => "nothing was changed",
-        JobCommand::Submit(_) => "the job may have been accepted (see `osteon job list`)",
-        JobCommand::Prune(_) => "jobs may have been deleted (see `osteon job list`)",
-        JobCommand::Watch(_) => "the job continues (see `osteon job list`, `osteon job cancel`)",
-        JobCommand::Recheck(_) => "the job may be computed again (see `osteon job list`)",
-        JobCommand::Cancel(_) => "the job may have been cancelled (see `osteon job list`)",
-        JobCommand::Fetch(_) => "run the same command again to fetch the results",
-    }
-}
-
-/// Executes a command about jobs.
-pub(super) async fn perform(
+/// Prepares a command about jobs.
+///
+/// # Errors
+/// When neither command line nor environment names a coordinator.
+pub(super) fn prepare(
     command: JobCommand,
-    coordinator: &Remote,
-) -> Result<ExitStatus, CommandFailure> {
-    match command {
-        JobCommand::Submit(arguments) => submit(arguments, coordinator).await,
-        JobCommand::List(arguments) => list(coordinator, format(arguments.json)).await,
-        JobCommand::Watch(WatchArguments { job, json }) => {
-            watch(&job.job, coordinator, format(json)).await
+    context: &ProcessContext,
+) -> Result<PreparedCommand, CommandFailure> {
+    let remote = |client| context.remote(client);
+    Ok(match command {
+        JobCommand::Submit(arguments) => {
+            let coordinator = remote(arguments.client.clone())?;
+            let left = "the job may have been accepted (see `osteon job list`)";
+            PreparedCommand::interruptible(left, submit(arguments, coordinator))
         }
-        JobCommand::Explain(ExplainArguments { job, json, .. }) => {
-            explain(&job, coordinator, format(json)).await
+        JobCommand::List(JobListArguments { client, json }) => {
+            PreparedCommand::harmless(list(remote(client)?, format(json)))
         }
-        JobCommand::Cancel(JobArguments { job, .. }) => cancel(&job, coordinator).await,
-        JobCommand::Fetch(FetchArguments { job, out, .. }) => fetch(&job, coordinator, &out).await,
-        JobCommand::Recheck(WatchArguments { job, json }) => {
-            recheck(&job.job, coordinator, format(json)).await
+        JobCommand::Watch(WatchArguments { job: JobArguments { job, client }, json }) => {
+            let left = "the job continues (see `osteon job list`, `osteon job cancel`)";
+            PreparedCommand::interruptible(left, watch(job, remote(client)?, format(json)))
         }
-        JobCommand::Prune(arguments) => prune(arguments, coordinator).await,
-    }
+        JobCommand::Explain(ExplainArguments { job, client, json }) => {
+            PreparedCommand::harmless(explain(job, remote(client)?, format(json)))
+        }
+        JobCommand::Cancel(JobArguments { job, client }) => {
+            let left = "the job may have been cancelled (see `osteon job list`)";
+            PreparedCommand::interruptible(left, cancel(job, remote(client)?))
+        }
+        JobCommand::Fetch(FetchArguments { job, client, out }) => {
+            let left = "run the same command again to fetch the results";
+            PreparedCommand::interruptible(left, fetch(job, remote(client)?, out))
+        }
+        JobCommand::Recheck(WatchArguments { job: JobArguments { job, client }, json }) => {
+            let left = "the job may be computed again (see `osteon job list`)";
+            PreparedCommand::interruptible(left, recheck(job, remote(client)?, format(json)))
+        }
+        JobCommand::Prune(arguments) => {
+            let coordinator = remote(arguments.client.clone())?;
+            let left = "jobs may have been deleted (see `osteon job list`)";
+            PreparedCommand::interruptible(left, prune(arguments, coordinator))
+        }
+    })
 }
 
 /// `submit`: prints the job's id.
-async fn submit(
-    arguments: SubmitArguments,
-    coordinator: &Remote,
-) -> Result<ExitStatus, CommandFailure> {
+async fn submit(arguments: SubmitArguments, coordinator: Remote) -> Ended {
     let SubmitArguments { job, propagate, request_id, name, priority, json, .. } = arguments;
     let request = match request_id {
         None => RequestId::new().map_err(CommandFailure::failed)?,
@@ -81,7 +89,7 @@ async fn submit(
     let noted = job_file::of_input(&input, kind).map_err(CommandFailure::bad_input)?;
     unsearched_groups::warn(input.path(), &noted);
     warnings::say_of_job(&noted.specification, &noted.warnings).await;
-    let mut client = user::connect(coordinator).await?;
+    let mut client = user::connect(&coordinator).await?;
     let options = SubmitOptions { priority, name: name.unwrap_or_default() };
     let id = client.submit(&noted.specification, &request, options).await?;
     output::stdout(format(json)).submitted(&id).map_err(stdout_failure)?;
@@ -89,8 +97,8 @@ async fn submit(
 }
 
 /// `list`: prints all jobs, and the workers that are banned.
-async fn list(coordinator: &Remote, format: OutputFormat) -> Result<ExitStatus, CommandFailure> {
-    let mut client = user::connect(coordinator).await?;
+async fn list(coordinator: Remote, format: OutputFormat) -> Ended {
+    let mut client = user::connect(&coordinator).await?;
     let (jobs, concerns) = client.list_with_concerns().await?;
     let banned = client.banned().await?;
     output::stdout(format).jobs(&jobs, &banned).map_err(stdout_failure)?;
@@ -100,25 +108,18 @@ async fn list(coordinator: &Remote, format: OutputFormat) -> Result<ExitStatus, 
     Ok(ExitStatus::Done)
 }
 
-/// `jobs prune`: prints the ids of the deleted jobs.
-async fn prune(
-    arguments: PruneArguments,
-    coordinator: &Remote,
-) -> Result<ExitStatus, CommandFailure> {
+/// `prune`: prints the ids of the deleted jobs.
+async fn prune(arguments: PruneArguments, coordinator: Remote) -> Ended {
     let PruneArguments { older_than, keep_last, json, .. } = arguments;
-    let jobs = user::connect(coordinator).await?.prune(older_than, keep_last).await?;
+    let jobs = user::connect(&coordinator).await?.prune(older_than, keep_last).await?;
     output::stdout(format(json)).pruned(&jobs).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
 /// `watch`: prints a line when the job changes, at most one a second, until it has ended.
-async fn watch(
-    job: &str,
-    coordinator: &Remote,
-    format: OutputFormat,
-) -> Result<ExitStatus, CommandFailure> {
-    user::announce(coordinator);
-    let mut client = user::connect(coordinator).await?;
+async fn watch(job: String, coordinator: Remote, format: OutputFormat) -> Ended {
+    user::announce(&coordinator);
+    let mut client = user::connect(&coordinator).await?;
     let mut output = output::stdout(format);
     let mut last_line: Option<Instant> = None;
     let show = |snapshot: &JobSnapshot| {
@@ -129,43 +130,35 @@ async fn watch(
         last_line = Some(Instant::now());
         output.snapshot(snapshot).map_err(stdout_failure)
     };
-    let last = client.watch(job, show).await?;
+    let last = client.watch(&job, show).await?;
     Ok(exit_status(&last))
 }
 
 /// `recheck`: computes a job again that a banned host contributed to, and follows it to its end, which says
 /// whether its result has changed.
-async fn recheck(
-    job: &str,
-    coordinator: &Remote,
-    format: OutputFormat,
-) -> Result<ExitStatus, CommandFailure> {
-    user::connect(coordinator).await?.recheck(job).await?;
+async fn recheck(job: String, coordinator: Remote, format: OutputFormat) -> Ended {
+    user::connect(&coordinator).await?.recheck(&job).await?;
     watch(job, coordinator, format).await
 }
 
 /// `explain`: prints what decides how fast a job is.
-async fn explain(
-    job: &str,
-    coordinator: &Remote,
-    format: OutputFormat,
-) -> Result<ExitStatus, CommandFailure> {
-    let explained = user::connect(coordinator).await?.explain(job).await?;
+async fn explain(job: String, coordinator: Remote, format: OutputFormat) -> Ended {
+    let explained = user::connect(&coordinator).await?.explain(&job).await?;
     output::stdout(format).explanation(&explained).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
 /// `cancel`: prints the job's state afterwards.
-async fn cancel(job: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
-    let snapshot = user::connect(coordinator).await?.cancel(job).await?;
+async fn cancel(job: String, coordinator: Remote) -> Ended {
+    let snapshot = user::connect(&coordinator).await?.cancel(&job).await?;
     output::stdout(OutputFormat::Text).snapshot(&snapshot).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
 /// `fetch`: writes the results of an ended job. Nothing is written while it has not ended.
-async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result<ExitStatus, CommandFailure> {
+async fn fetch(job: String, coordinator: Remote, out: PathBuf) -> Ended {
     let fetched =
-        user::connect(coordinator).await?.fetch(job).await.map_err(|error| match &error {
+        user::connect(&coordinator).await?.fetch(&job).await.map_err(|error| match &error {
             ClientError::Refused { code: Code::FailedPrecondition, reason, .. } => {
                 CommandFailure::failed(anyhow!(
                     "{reason}; wait for it with `osteon job watch {job}`"
@@ -178,17 +171,17 @@ async fn fetch(job: &str, coordinator: &Remote, out: &Path) -> Result<ExitStatus
     }
     let specification = &fetched.specification;
     // Checked before anything is created there, and again when the directory is locked.
-    ResultsDirectory::stored(out, specification)?;
-    let directory = ResultsDirectory::open(out)?;
-    let stored = ResultsDirectory::stored(out, specification)?;
+    ResultsDirectory::stored(&out, specification)?;
+    let directory = ResultsDirectory::open(&out)?;
+    let stored = ResultsDirectory::stored(&out, specification)?;
     let wanted = match stored {
-        Some(stored) => replaces(&fetched, &stored, out)?,
+        Some(stored) => replaces(&fetched, &stored, &out)?,
         None => true,
     };
     if wanted {
         directory.write_results(&fetched, &*user::listener())?;
     }
-    let line = format!("{}\n", visible::path(out));
+    let line = format!("{}\n", visible::path(&out));
     output::stdout(OutputFormat::Text).verbatim(&line).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }

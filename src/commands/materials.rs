@@ -8,10 +8,11 @@ use serde_json::{Value, json};
 use crate::arguments::MaterialsArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
+use crate::prepared_command::Ended;
 use crate::resolved::OutputFormat;
 
 /// Prints the list, or one material with its values and reference.
-pub(super) fn print(arguments: &MaterialsArguments) -> Result<ExitStatus, CommandFailure> {
+pub(super) fn print(arguments: &MaterialsArguments) -> Ended {
     let shown: Vec<_> = match &arguments.name {
         None => materials::all().iter().collect(),
         Some(name) => {

@@ -10,6 +10,7 @@ use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::job_point;
 use crate::new_files::{self, NewFile};
 use crate::output::{self, ShownObservations};
+use crate::prepared_command::Ended;
 use crate::resolved;
 use osteon_local::observations::{ObservationError, Observations};
 
@@ -17,12 +18,9 @@ use osteon_local::observations::{ObservationError, Observations};
 const BAR: &str = "{bar:30} {pos} of {len} realizations, {eta} left";
 
 /// Computes the realizations, writes their rows if requested, and prints the summary.
-pub(super) async fn observe(
-    arguments: ObserveArguments,
-    isa: Isa,
-    threads: u32,
-) -> Result<ExitStatus, CommandFailure> {
-    let ObserveArguments { job, place, threads: _, out, json } = arguments;
+pub(super) async fn observe(arguments: ObserveArguments, isa: Isa, cores: u32) -> Ended {
+    let ObserveArguments { job, place, threads, out, json } = arguments;
+    let threads = threads.unwrap_or(cores);
     let input = job.open().map_err(CommandFailure::bad_input)?;
     let noted =
         job_file::of_input(&input, JobKind::Propagation).map_err(CommandFailure::bad_input)?;

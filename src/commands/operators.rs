@@ -1,4 +1,4 @@
-//! `workers`, `health`, `backup`: commands for operators of a coordinator.
+//! `worker list`, `worker drain`, `coordinator health` and others: commands for operators of a coordinator.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -13,9 +13,15 @@ use osteon_coordinator::store::sqlite::SqliteStore;
 use osteon_proto::v1::BackupEnd;
 use tempfile::NamedTempFile;
 
+use crate::arguments::{
+    BackupArguments, CoordinatorCommand, DrainArguments, HealthArguments, UnbanArguments,
+    WorkerCommand, WorkerListArguments,
+};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
-use crate::resolved::OutputFormat;
+use crate::prepared_command::{Ended, PreparedCommand};
+use crate::process_context::ProcessContext;
+use crate::resolved::{OutputFormat, format};
 use crate::user;
 
 /// Name of a store's file in its directory, and of the files that SQLite keeps beside it.
@@ -23,44 +29,78 @@ const STORE: &str = "osteon.sqlite";
 const BESIDE_STORE: [&str; 3] =
     ["osteon.sqlite-wal", "osteon.sqlite-journal", "osteon.acknowledged"];
 
-/// `workers`: prints the attached workers, those that left last, and those that are banned.
-pub(super) async fn workers(
-    coordinator: &Remote,
-    format: OutputFormat,
-) -> Result<ExitStatus, CommandFailure> {
-    let mut client = user::connect(coordinator).await?;
+/// Prepares a command about workers.
+///
+/// # Errors
+/// When neither command line nor environment names a coordinator.
+pub(super) fn prepare_for_worker(
+    command: WorkerCommand,
+    context: &ProcessContext,
+) -> Result<PreparedCommand, CommandFailure> {
+    let remote = |client| context.remote(client);
+    Ok(match command {
+        WorkerCommand::List(WorkerListArguments { client, json }) => {
+            PreparedCommand::harmless(workers(remote(client)?, format(json)))
+        }
+        WorkerCommand::Drain(DrainArguments { worker, client, json }) => {
+            let left = "the worker may have been told to drain (see `osteon worker list`)";
+            PreparedCommand::interruptible(left, drain(worker, remote(client)?, format(json)))
+        }
+        WorkerCommand::Unban(UnbanArguments { host, client }) => {
+            let left = "the ban may have been lifted (see `osteon worker list`)";
+            PreparedCommand::interruptible(left, unban(host, remote(client)?))
+        }
+        WorkerCommand::Wing(command) => command.prepare(context)?,
+    })
+}
+
+/// Prepares a command about a running coordinator.
+///
+/// # Errors
+/// When neither command line nor environment names a coordinator.
+pub(super) fn prepare_for_coordinator(
+    command: CoordinatorCommand,
+    context: &ProcessContext,
+) -> Result<PreparedCommand, CommandFailure> {
+    Ok(match command {
+        CoordinatorCommand::Health(HealthArguments { client, timeout, json }) => {
+            let limit = Duration::from_secs_f64(timeout);
+            PreparedCommand::harmless(health(context.remote(client)?, limit, format(json)))
+        }
+        CoordinatorCommand::Backup(BackupArguments { directory, client, json }) => {
+            let copied = backup(directory, context.remote(client)?, format(json));
+            PreparedCommand::interruptible("no copy was kept", copied)
+        }
+    })
+}
+
+/// `worker list`: prints the attached workers, those that left last, and those that are banned.
+async fn workers(coordinator: Remote, format: OutputFormat) -> Ended {
+    let mut client = user::connect(&coordinator).await?;
     let workers = client.workers().await?;
     let banned = client.banned().await?;
     output::stdout(format).workers(&workers, &banned).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
-/// `workers drain`: prints the worker's state afterwards.
-pub(super) async fn drain(
-    worker: u64,
-    coordinator: &Remote,
-    format: OutputFormat,
-) -> Result<ExitStatus, CommandFailure> {
-    let worker = user::connect(coordinator).await?.drain(worker).await?;
+/// `worker drain`: prints the worker's state afterwards.
+async fn drain(worker: u64, coordinator: Remote, format: OutputFormat) -> Ended {
+    let worker = user::connect(&coordinator).await?.drain(worker).await?;
     output::stdout(format).worker(&worker).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
-/// `workers unban`: prints the host whose ban is lifted.
-pub(super) async fn unban(host: &str, coordinator: &Remote) -> Result<ExitStatus, CommandFailure> {
-    let worker = user::connect(coordinator).await?.unban(host).await?;
+/// `worker unban`: prints the host whose ban is lifted.
+async fn unban(host: String, coordinator: Remote) -> Ended {
+    let worker = user::connect(&coordinator).await?.unban(&host).await?;
     let line = format!("{}\n", visible::line(&worker.host));
     output::stdout(OutputFormat::Text).verbatim(&line).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
-/// `health`: prints whether a coordinator is serving; the exit code is 0 if it is.
-pub(super) async fn health(
-    coordinator: &Remote,
-    limit: Duration,
-    format: OutputFormat,
-) -> Result<ExitStatus, CommandFailure> {
-    let reason = match operators::health(coordinator, limit, user::listener()).await {
+/// `coordinator health`: prints whether a coordinator is serving; the exit code is 0 if it is.
+async fn health(coordinator: Remote, limit: Duration, format: OutputFormat) -> Ended {
+    let reason = match operators::health(&coordinator, limit, user::listener()).await {
         Ok(true) => None,
         Ok(false) => Some(anyhow!(
             "the coordinator at {} reports that it is not serving",
@@ -79,20 +119,16 @@ pub(super) async fn health(
     }
 }
 
-/// `backup`: copies the store of a running coordinator, completely or not at all.
-pub(super) async fn backup(
-    directory: &Path,
-    coordinator: &Remote,
-    format: OutputFormat,
-) -> Result<ExitStatus, CommandFailure> {
-    let target = unused_copy_path(directory)?;
-    let mut client = user::connect(coordinator).await?;
-    let shown = visible::path(directory);
-    SqliteStore::make_directory(directory).map_err(|error| {
+/// `coordinator backup`: copies the store of a running coordinator, completely or not at all.
+async fn backup(directory: PathBuf, coordinator: Remote, format: OutputFormat) -> Ended {
+    let target = unused_copy_path(&directory)?;
+    let mut client = user::connect(&coordinator).await?;
+    let shown = visible::path(&directory);
+    SqliteStore::make_directory(&directory).map_err(|error| {
         CommandFailure::unusable_path(error, format!("cannot create the directory {shown}"))
     })?;
     // Removed when it is dropped; others cannot read it.
-    let file = tempfile::Builder::new().prefix(".osteon-backup-").tempfile_in(directory);
+    let file = tempfile::Builder::new().prefix(".osteon-backup-").tempfile_in(&directory);
     let mut file = file.map_err(|error| {
         CommandFailure::unusable_path(error, format!("cannot make a file in {shown}"))
     })?;
@@ -104,7 +140,7 @@ pub(super) async fn backup(
         .with_context(|| format!("cannot make {}", visible::path(&target)))
         .map_err(CommandFailure::Failed)?;
     // Syncs the directory, so that the file's name survives a power failure, too.
-    let directory = File::open(directory).and_then(|directory| directory.sync_all());
+    let directory = File::open(&directory).and_then(|directory| directory.sync_all());
     directory.with_context(unsynced).map_err(CommandFailure::Failed)?;
     output::stdout(format).backup(&target, &end).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)

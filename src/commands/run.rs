@@ -9,7 +9,7 @@ use osteon_client::embedded::{EmbeddedSetup, StoreLocation};
 use osteon_client::result_status;
 use osteon_client::results_directory::ResultsDirectory;
 use osteon_client::run::{self, JobRun};
-use osteon_common::job::JobSpecification;
+use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::results::Status;
 use osteon_coordinator::service::open_files;
 use osteon_files::job_file;
@@ -17,18 +17,50 @@ use osteon_files::report::ResultFile;
 use osteon_proto::v1::JobSnapshot;
 use osteon_solver::Isa;
 
-use crate::arguments::VerbosityArguments;
+use crate::arguments::{RunArguments, VerbosityArguments};
 use crate::exit_status::{CommandFailure, ExitStatus, Interruption, stdout_failure};
 use crate::output::{self, Detail, ShownResult};
-use crate::process_context::RunLocation;
+use crate::prepared_command::{Ended, PreparedCommand};
+use crate::process_context::{ProcessContext, RunLocation};
 use crate::progress::{Progress, ShownProgress, say};
 use crate::resolved::Run;
 use crate::signals;
 use crate::user;
 use crate::{cost, program, unsearched_groups, warnings};
 
+/// Prepares an identification.
+///
+/// # Errors
+/// When command line and environment do not say where.
+pub(super) fn prepare_identification(
+    arguments: RunArguments,
+    context: &ProcessContext,
+) -> Result<PreparedCommand, CommandFailure> {
+    prepare(Run::resolve(JobKind::Identification, arguments, context)?)
+}
+
+/// Prepares a propagation.
+///
+/// # Errors
+/// When command line and environment do not say where.
+pub(super) fn prepare_propagation(
+    arguments: RunArguments,
+    context: &ProcessContext,
+) -> Result<PreparedCommand, CommandFailure> {
+    prepare(Run::resolve(JobKind::Propagation, arguments, context)?)
+}
+
+fn prepare(resolved: Run) -> Result<PreparedCommand, CommandFailure> {
+    // Workers read the variable again, but an invalid value is reported here, at once.
+    let isa = match resolved.location {
+        RunLocation::Local { .. } => Some(ProcessContext::isa()?),
+        RunLocation::Coordinator(_) => None,
+    };
+    Ok(PreparedCommand::new(run(resolved, isa)))
+}
+
 /// Runs the job, or shows the result of an earlier run.
-pub(super) async fn run(run: Run, isa: Option<Isa>) -> Result<ExitStatus, CommandFailure> {
+async fn run(run: Run, isa: Option<Isa>) -> Ended {
     let input = run.job.open().map_err(CommandFailure::bad_input)?;
     let noted = job_file::of_input(&input, run.kind).map_err(CommandFailure::bad_input)?;
     let specification = &noted.specification;
@@ -139,11 +171,7 @@ fn keep(
     Ok(fetched.result)
 }
 
-fn show(
-    run: &Run,
-    specification: &JobSpecification,
-    result: &ResultFile,
-) -> Result<ExitStatus, CommandFailure> {
+fn show(run: &Run, specification: &JobSpecification, result: &ResultFile) -> Ended {
     let detail = match run.verbosity {
         VerbosityArguments { quiet: true, .. } => Detail::Summary,
         VerbosityArguments { verbose: true, .. } => Detail::Full,

@@ -16,6 +16,7 @@ use tokio::task::JoinHandle;
 use crate::arguments::SimulateArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output::{self, ShownSimulation};
+use crate::prepared_command::Ended;
 use crate::program;
 use crate::progress::say;
 use crate::resolved;
@@ -26,10 +27,7 @@ const FIRST_WORD: Duration = Duration::from_secs(5);
 const LATER_WORDS: Duration = Duration::from_secs(60);
 
 /// Solves the case, writes its files if requested, and prints the result.
-pub(super) async fn simulate(
-    arguments: SimulateArguments,
-    isa: Isa,
-) -> Result<ExitStatus, CommandFailure> {
+pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Ended {
     let format = resolved::format(arguments.json);
     let input = arguments.case.open().map_err(CommandFailure::bad_input)?;
     let case = case_file::of_input(&input).map_err(CommandFailure::bad_input)?;

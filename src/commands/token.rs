@@ -9,10 +9,11 @@ use crate::arguments::TokenArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::new_files::{self, NewFile};
 use crate::output;
+use crate::prepared_command::Ended;
 use crate::resolved::OutputFormat;
 
 /// Writes the token to its file, and its line to the coordinator's list or to stdout.
-pub(super) fn make(arguments: &TokenArguments) -> Result<ExitStatus, CommandFailure> {
+pub(super) fn make(arguments: &TokenArguments) -> Ended {
     let TokenArguments { name, role, out, tokens: list } = arguments;
     let role = Role::named(role).ok_or_else(|| {
         CommandFailure::bad_input(anyhow!(

@@ -6,6 +6,7 @@ use clap::Parser as _;
 use osteon_client::environment::Environment;
 
 use super::*;
+use crate::arguments::{Arguments, Command};
 
 fn run(line: &str, cores: u32, coordinator: Option<&str>) -> Run {
     let words = line.split_whitespace();
@@ -13,7 +14,7 @@ fn run(line: &str, cores: u32, coordinator: Option<&str>) -> Run {
     let (Command::Identify(arguments) | Command::Propagate(arguments)) = command else {
         panic!("{line} is no run");
     };
-    resolve_run(JobKind::Identification, arguments, &context(coordinator, cores)).unwrap()
+    Run::resolve(JobKind::Identification, arguments, &context(coordinator, cores)).unwrap()
 }
 
 /// An environment with this coordinator, and files for it.
@@ -65,7 +66,7 @@ fn an_environment_that_is_no_address_is_bad_input() {
         panic!("no run");
     };
     let failure =
-        resolve_run(JobKind::Identification, arguments, &context(Some("nowhere"), 2)).unwrap_err();
+        Run::resolve(JobKind::Identification, arguments, &context(Some("nowhere"), 2)).unwrap_err();
     assert_eq!(failure.exit_code(), 2);
     assert!(failure.to_string().contains("OSTEON_COORDINATOR"), "{failure}");
     assert!(failure.to_string().contains("`nowhere`"), "{failure}");

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use osteon_client::report_directory::{self, REPORT};
 
-use super::{Performance, WingCommand};
 use crate::exit_status::{CommandFailure, ExitStatus};
+use crate::prepared_command::Ended;
 use crate::progress::say;
 
 /// Arguments of `report`.
@@ -45,14 +45,8 @@ impl ReportOption {
     }
 }
 
-impl WingCommand for ReportArguments {
-    fn perform(self: Box<Self>) -> Performance {
-        Box::pin(async move { report(&self) })
-    }
-}
-
 /// Reads the results, and writes their report.
-fn report(arguments: &ReportArguments) -> Result<ExitStatus, CommandFailure> {
+pub(super) fn report(arguments: &ReportArguments) -> Ended {
     let directories = &arguments.directories;
     let out = match (&arguments.out, directories.first()) {
         (Some(out), _) => out.clone(),

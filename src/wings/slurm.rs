@@ -1,4 +1,4 @@
-//! `slurm script` and `slurm array`, which print batch scripts; `workers slurm`, which submits workers as
+//! `slurm script` and `slurm array`, which print batch scripts; `worker slurm`, which submits workers as
 //! long as jobs wait for them.
 
 mod arguments;
@@ -12,11 +12,10 @@ use osteon_slurm::worker_script::WorkerScript;
 use osteon_transport::credentials::Credentials;
 use osteon_transport::endpoint::Endpoint;
 
-use self::resolved::SlurmTask;
-use super::{Performance, ResolvedWing, WingCommand};
-use crate::arguments::ClientArguments;
+use self::arguments::{SlurmCommand, WorkerArrayArguments};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
+use crate::prepared_command::{Ended, PreparedCommand};
 use crate::process_context::ProcessContext;
 use crate::progress::say;
 use crate::resolved::OutputFormat;
@@ -27,50 +26,42 @@ pub(super) use self::arguments::{ScalingArguments, SlurmArguments};
 /// Name of array workers in Slurm's queue.
 const ARRAY_NAME: &str = "osteon-worker";
 
-/// Resolves `slurm` and its subcommands.
-pub(super) fn resolve(arguments: SlurmArguments, context: &ProcessContext) -> ResolvedWing {
-    Ok(Box::new(resolved::scripts(arguments, context)?))
+/// Prepares the printing of a script.
+///
+/// # Errors
+/// When the arguments contradict each other, or the environment does not say enough.
+pub(super) fn prepare(
+    arguments: SlurmArguments,
+    context: &ProcessContext,
+) -> Result<PreparedCommand, CommandFailure> {
+    Ok(match arguments.command {
+        SlurmCommand::Script(arguments) => {
+            let script = resolved::job_script(arguments)?;
+            PreparedCommand::brief(move || job(&script))
+        }
+        SlurmCommand::Array(WorkerArrayArguments { count, client, allocation }) => {
+            let script = resolved::worker_script(allocation, &context.remote(client)?)?;
+            PreparedCommand::brief(move || array(&script, count))
+        }
+    })
 }
 
-/// Resolves `workers slurm`.
-pub(super) fn resolve_scaling(
+/// Prepares `worker slurm`.
+///
+/// # Errors
+/// When the arguments contradict each other, or the environment does not say enough.
+pub(super) fn prepare_scaling(
     arguments: ScalingArguments,
     context: &ProcessContext,
-    client: ClientArguments,
-) -> ResolvedWing {
-    Ok(Box::new(resolved::scaling(arguments, context, client)?))
-}
-
-impl WingCommand for SlurmTask {
-    fn default_log_level(&self) -> &'static str {
-        match self {
-            Self::Follow { .. } => "info",
-            Self::Job(_) | Self::Array { .. } => "warn",
-        }
-    }
-
-    fn left_by_interruption(&self) -> Option<&'static str> {
-        match self {
-            Self::Follow { .. } => Some(
-                "workers that wait or run stay, and end when they have had no work for a while",
-            ),
-            Self::Job(_) | Self::Array { .. } => None,
-        }
-    }
-
-    fn perform(self: Box<Self>) -> Performance {
-        Box::pin(async move {
-            match *self {
-                Self::Job(script) => job(&script),
-                Self::Array { script, count } => array(&script, count),
-                Self::Follow { plan, dry_run } => follow(&plan, dry_run).await,
-            }
-        })
-    }
+) -> Result<PreparedCommand, CommandFailure> {
+    let dry_run = arguments.dry_run;
+    let plan = resolved::scaling_plan(arguments, context)?;
+    let left = "workers that wait or run stay, and end when they have had no work for a while";
+    Ok(PreparedCommand::interruptible(left, follow(plan, dry_run)).with_events())
 }
 
 /// `slurm script`: checks the job file, and prints the script.
-fn job(script: &JobScript) -> Result<ExitStatus, CommandFailure> {
+fn job(script: &JobScript) -> Ended {
     // Errors are told here, and not by a job that has waited for its nodes.
     let specification =
         job_file::read(&script.job, script.kind).map_err(CommandFailure::bad_input)?;
@@ -79,13 +70,13 @@ fn job(script: &JobScript) -> Result<ExitStatus, CommandFailure> {
 }
 
 /// `slurm array`: prints the script.
-fn array(script: &WorkerScript, count: u32) -> Result<ExitStatus, CommandFailure> {
+fn array(script: &WorkerScript, count: u32) -> Ended {
     check_workers(script)?;
     print(&script.text(ARRAY_NAME, count, false).map_err(CommandFailure::bad_input)?)
 }
 
-/// `workers slurm`: looks and acts until it is interrupted, or once with `--dry-run`.
-async fn follow(plan: &ScalingPlan, dry_run: bool) -> Result<ExitStatus, CommandFailure> {
+/// `worker slurm`: looks and acts until it is interrupted, or once with `--dry-run`.
+async fn follow(plan: ScalingPlan, dry_run: bool) -> Ended {
     check_workers(&plan.script)?;
     if dry_run {
         let decision = plan.decide(&user::listener()).await.map_err(look_failure)?;
@@ -115,7 +106,7 @@ fn check_workers(script: &WorkerScript) -> Result<(), CommandFailure> {
     Ok(())
 }
 
-fn print(text: &str) -> Result<ExitStatus, CommandFailure> {
+fn print(text: &str) -> Ended {
     output::stdout(OutputFormat::Text).verbatim(text).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }

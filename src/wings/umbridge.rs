@@ -17,9 +17,9 @@ use osteon_files::job_file::{self, FilePurpose};
 use osteon_umbridge::{Evaluator, ModelListener, ServedJob, router};
 
 use self::resolved::ModelService;
-use super::{Performance, ResolvedWing, WingCommand};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output;
+use crate::prepared_command::{Ended, PreparedCommand};
 use crate::process_context::{ProcessContext, RunLocation};
 use crate::progress::say;
 use crate::resolved::OutputFormat;
@@ -32,19 +32,19 @@ pub(super) use self::arguments::UmbridgeArguments;
 /// Time that an embedded coordinator keeps evaluated points: long enough to be fetched.
 const KEPT: Duration = Duration::from_secs(60);
 
-/// Resolves the arguments.
-pub(super) fn resolve(arguments: UmbridgeArguments, context: &ProcessContext) -> ResolvedWing {
-    Ok(Box::new(resolved::service(arguments, context)?))
-}
-
-impl WingCommand for ModelService {
-    fn perform(self: Box<Self>) -> Performance {
-        Box::pin(serve(*self))
-    }
+/// Prepares a server.
+///
+/// # Errors
+/// When arguments and environment do not say where.
+pub(super) fn prepare(
+    arguments: UmbridgeArguments,
+    context: &ProcessContext,
+) -> Result<PreparedCommand, CommandFailure> {
+    Ok(PreparedCommand::new(serve(resolved::service(arguments, context)?)))
 }
 
 /// Serves until SIGINT or SIGTERM, or until the workers cannot continue. The URL is printed.
-async fn serve(service: ModelService) -> Result<ExitStatus, CommandFailure> {
+async fn serve(service: ModelService) -> Ended {
     let ModelService { job, address, hosts, location, isa } = service;
     let input = job.open().map_err(CommandFailure::bad_input)?;
     let kind = match job_file::purpose(&input).map_err(CommandFailure::bad_input)? {

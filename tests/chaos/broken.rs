@@ -87,13 +87,13 @@ fn a_broken_machine_of_two_processes_is_banned_and_in_no_result() {
         let url = story.service.url().to_owned();
         let mut again = worker_on(&story.scratch, &url, "broken");
         assert_eq!(again.code(), Some(BAD_MACHINE));
-        let listed = osteon(&["workers", "--coordinator", &url]);
+        let listed = osteon(&["worker", "list", "--coordinator", &url]);
         assert!(listed.stdout.contains("broken (process "), "{listed:?}");
-        let lifted = osteon(&["workers", "unban", "broken", "--coordinator", &url]);
+        let lifted = osteon(&["worker", "unban", "broken", "--coordinator", &url]);
         assert_eq!((lifted.code, lifted.stdout.as_str()), (Some(0), "broken\n"), "{lifted:?}");
         let _repaired = worker_on(&story.scratch, &url, "broken");
         eventually("the repaired machine is attached", || {
-            let listed = osteon(&["workers", "--coordinator", &url]);
+            let listed = osteon(&["worker", "list", "--coordinator", &url]);
             listed.stdout.lines().any(|line| line.contains(" broken ") && line.contains(" ok"))
         });
     }

@@ -51,7 +51,7 @@ pub enum CloseReason {
     /// A worker of its host was banned for wrong answers.
     #[error(
         "host {host} is banned: one of its workers {reason}; run `osteon doctor` on it, and when it is \
-         repaired, lift the ban with `osteon workers unban {host}`"
+         repaired, lift the ban with `osteon worker unban {host}`"
     )]
     Banned {
         /// The host.

@@ -262,7 +262,7 @@ pub enum Refusal {
         worker: WorkerId,
     },
     /// No ban of this host is in force.
-    #[error("host `{}` is not banned; `osteon workers` lists those that are", host.escape_debug())]
+    #[error("host `{}` is not banned; `osteon worker list` lists those that are", host.escape_debug())]
     NotBanned {
         /// The host asked for.
         host: String,

@@ -45,7 +45,7 @@ def program_workers(url: str) -> int:
     """How many workers are attached to the coordinator."""
     import json
 
-    return len(json.loads(program("workers", "--json", "--coordinator", url))["workers"])
+    return len(json.loads(program("worker", "list", "--json", "--coordinator", url))["workers"])
 
 
 def until(is_so: Callable[[], bool], what: str) -> None:

@@ -119,7 +119,7 @@ pub(crate) struct AllocationArguments {
     pub(crate) further: Vec<String>,
 }
 
-/// Arguments of `workers slurm`.
+/// Arguments of `worker slurm`.
 #[derive(Debug, Args)]
 pub(crate) struct ScalingArguments {
     /// Number of workers that are kept without work, too

@@ -13,57 +13,17 @@ use osteon_slurm::worker_script::{MARGIN, WorkerScript};
 use osteon_transport::credentials::CredentialFiles;
 use osteon_transport::endpoint::Endpoint;
 
-use super::arguments::{
-    AllocationArguments, JobScriptArguments, ScalingArguments, SlurmArguments, SlurmCommand,
-    WorkerArrayArguments,
-};
-use crate::arguments::ClientArguments;
+use super::arguments::{AllocationArguments, JobScriptArguments, ScalingArguments};
 use crate::exit_status::CommandFailure;
 use crate::process_context::ProcessContext;
 
-/// A command about Slurm.
-#[derive(Debug)]
-pub(super) enum SlurmTask {
-    /// `slurm script`.
-    Job(Box<JobScript>),
-    /// `slurm array`.
-    Array {
-        /// The script.
-        script: Box<WorkerScript>,
-        /// Number of workers.
-        count: u32,
-    },
-    /// `workers slurm`.
-    Follow {
-        /// What is followed, and how.
-        plan: Box<ScalingPlan>,
-        /// Whether nothing is to be changed.
-        dry_run: bool,
-    },
-}
-
-/// Resolves `slurm` and its subcommands.
-pub(super) fn scripts(
-    arguments: SlurmArguments,
-    context: &ProcessContext,
-) -> Result<SlurmTask, CommandFailure> {
-    match arguments.command {
-        SlurmCommand::Script(script) => Ok(SlurmTask::Job(Box::new(job_script(script)?))),
-        SlurmCommand::Array(WorkerArrayArguments { count, client, allocation }) => {
-            let script = Box::new(worker_script(allocation, &context.remote(client)?)?);
-            Ok(SlurmTask::Array { script, count })
-        }
-    }
-}
-
-/// Resolves `workers slurm`; `client` is what stands before the operation.
-pub(super) fn scaling(
+/// Returns what `worker slurm` follows, and how.
+pub(super) fn scaling_plan(
     arguments: ScalingArguments,
     context: &ProcessContext,
-    client: ClientArguments,
-) -> Result<SlurmTask, CommandFailure> {
-    let ScalingArguments { min, max, backlog, interval, dry_run, .. } = arguments;
-    let coordinator = context.remote(arguments.client.or(client))?;
+) -> Result<ScalingPlan, CommandFailure> {
+    let ScalingArguments { min, max, backlog, interval, .. } = arguments;
+    let coordinator = context.remote(arguments.client)?;
     if min > max {
         return Err(CommandFailure::bad_input(anyhow!(
             "--min {min} must not be larger than --max {max}"
@@ -77,17 +37,17 @@ pub(super) fn scaling(
         threads_per_worker: script.cpus,
         idle_timeout: script.idle_timeout,
     };
-    let plan = Box::new(ScalingPlan {
+    Ok(ScalingPlan {
         script,
         policy,
         realizations_per_thread: arguments.realizations_per_thread,
         interval: Duration::from_secs(interval.into()),
         coordinator,
-    });
-    Ok(SlurmTask::Follow { plan, dry_run })
+    })
 }
 
-fn job_script(arguments: JobScriptArguments) -> Result<JobScript, CommandFailure> {
+/// Returns the script of a job.
+pub(super) fn job_script(arguments: JobScriptArguments) -> Result<JobScript, CommandFailure> {
     let JobScriptArguments { job, time_limit, stop_before, .. } = arguments;
     if let Some(limit) = time_limit
         && limit < Duration::from_secs(2 * u64::from(stop_before))
@@ -117,7 +77,8 @@ fn job_script(arguments: JobScriptArguments) -> Result<JobScript, CommandFailure
     })
 }
 
-fn worker_script(
+/// Returns the script of a worker.
+pub(super) fn worker_script(
     arguments: AllocationArguments,
     coordinator: &Remote,
 ) -> Result<WorkerScript, CommandFailure> {

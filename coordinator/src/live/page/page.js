@@ -121,7 +121,7 @@ const showAlerts = ({ jobs: all, workers, mismatches, concerns }) => {
   const alerts = [];
   for (const [number, text] of concerns.entries()) alerts.push(["bad", `Note ${number + 1}`, `${text[0].toUpperCase()}${text.slice(1)}.`]);
   if (workers.count === 0 && all.running + all.waiting > 0) alerts.push(["caution", "Workers", "None is attached, so nothing is computed."]);
-  if (workers.banned > 0) alerts.push(["bad", "Banned", `${count(workers.banned, "host", "hosts")} gave wrong results and ${workers.banned === 1 ? "is" : "are"} refused until an operator lifts the ban (osteon workers unban).`]);
+  if (workers.banned > 0) alerts.push(["bad", "Banned", `${count(workers.banned, "host", "hosts")} gave wrong results and ${workers.banned === 1 ? "is" : "are"} refused until an operator lifts the ban (osteon worker unban).`]);
   if (workers.on_probation + workers.distrusted > 0) alerts.push(["caution", "Unreliable", `${count(workers.on_probation + workers.distrusted, "worker gets", "workers get")} little work: batches were lost or not answered.`]);
   if (mismatches > 0 && workers.banned === 0) alerts.push(["caution", "Answers", `${count(mismatches, "answer differs", "answers differ")} from that of another worker.`]);
   byId("alerts").hidden = alerts.length === 0;

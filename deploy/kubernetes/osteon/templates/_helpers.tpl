@@ -131,6 +131,7 @@ affinity:
 exec:
   command:
     - /usr/bin/osteon
+    - coordinator
     - health
     - --coordinator
     - {{ include "osteon.scheme" . }}://{{ .Values.coordinator.probeHost }}:7000

@@ -159,7 +159,7 @@ class Pods(unittest.TestCase):
         return str(path)
 
     def workers(self):
-        return json.loads(output(OSTEON, "workers", "--json", *self.client()))["workers"]
+        return json.loads(output(OSTEON, "worker", "list", "--json", *self.client()))["workers"]
 
     def attached(self, number):
         return wait_for(f"attachment of {number} workers", lambda: len(self.workers()) == number)

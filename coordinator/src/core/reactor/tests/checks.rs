@@ -109,7 +109,8 @@ fn a_ban_lasts_until_it_is_lifted() {
     rig.event(answer(3, 3, 0, 1));
     rig.event(stored_event(1, RecordKey::Ban(1)));
     let unban = |host: &str| request(8, Request::Unban(host.to_owned()));
-    let unknown = "answer 8: host `node-2` is not banned; `osteon workers` lists those that are";
+    let unknown =
+        "answer 8: host `node-2` is not banned; `osteon worker list` lists those that are";
     rig.check(unban("node-2"), &[unknown]);
     let effects = rig.event(unban("node-1"));
     assert_eq!(effects.last().map(String::as_str), Some("answer 8: lifted node-1"));
@@ -117,7 +118,7 @@ fn a_ban_lasts_until_it_is_lifted() {
     rig.event(stored_event(1, RecordKey::Ban(1)));
     rig.check(
         unban("node-1"),
-        &["answer 8: host `node-1` is not banned; `osteon workers` lists those that are"],
+        &["answer 8: host `node-1` is not banned; `osteon worker list` lists those that are"],
     );
     let effects = rig.event(hello_of(9, 1, 1));
     assert_eq!(effects[0], "welcome 9, lease 4");
