@@ -89,6 +89,37 @@ fn a_check_compares_both_methods_with_a_refined_solution() {
 }
 
 #[test]
+fn sublayers_are_simulated_and_checked_by_both_methods() {
+    let scratch = Scratch::new();
+    let solid = fs::read_to_string(case("A.toml")).unwrap();
+    let (_, solid) = solid.split_once("[bone]\n").unwrap();
+    let sublayer = |thickness: &str, solid: &str| {
+        format!("[[bone.sublayers]]\nthickness = {thickness}\n{solid}\n")
+    };
+    let write = |name, upper: &str| {
+        let lower = sublayer("2.5e-3", solid);
+        scratch.write(name, &format!("{}{lower}", sublayer("1.5e-3", upper)))
+    };
+    let velocity =
+        |file: &Path| run(&["simulate", text(file), "--json"]).json()["velocity"].clone();
+    let plate = run(&["simulate", &case("A.toml"), "--json"]).json();
+    assert_eq!(velocity(&write("equal.toml", solid)), plate["velocity"], "to the bit");
+    let denser = solid.replace("density = 1598.8", "density = 1700.0");
+    let file = write("denser.toml", &denser);
+    let slower = velocity(&file).as_f64().unwrap();
+    assert!(slower < plate["velocity"].as_f64().unwrap() - 10.0, "{slower}");
+    let out = scratch.path("out");
+    let shown = run(&["simulate", text(&file), "--check", "--out", text(&out)]);
+    assert!(shown.succeeded().contains("the methods agree\n"), "{}", shown.stdout);
+    assert_eq!(velocity(&out.join("case.toml")).as_f64(), Some(slower));
+    let twice = write("twice.toml", &format!("{denser}[layers.bone]\nthickness = 4e-3\n"));
+    let refused = run(&["simulate", text(&twice)]);
+    assert_eq!(refused.code, Some(2));
+    let expected = "layers.bone.thickness: is given together with bone.sublayers";
+    assert!(refused.stderr.contains(expected), "{}", refused.stderr);
+}
+
+#[test]
 fn a_check_of_a_case_with_attenuation_refines_only() {
     let scratch = Scratch::new();
     let attenuation = "[layers]\nbone = { attenuation = { quality_factor = 15 } }\n";

@@ -1,10 +1,12 @@
 //! One deterministic problem: layers, probe, criterion, solver, and one bone.
 
-use crate::elasticity::Elasticity;
+use crate::bone::CaseBone;
 use crate::fields::{Key, Section};
 use crate::layers::Layers;
 use crate::probe::Probe;
 use crate::settings::{Picking, SolverSettings};
+
+pub use crate::bone::Bone;
 
 /// Everything but the bone's material: the part that all realizations of a job share, and the only
 /// part on which a solver's shared tables may depend.
@@ -42,20 +44,11 @@ impl Setup {
     }
 }
 
-/// The bone's material.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bone {
-    /// Mass density ρ, kg/m³.
-    pub density: f64,
-    /// Elasticity, Pa.
-    pub elasticity: Elasticity,
-}
-
 /// One case. A velocity's bits are a function of the case alone.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Case {
     /// Layers, probe, picking and solver.
     pub setup: Setup,
-    /// The bone.
-    pub bone: Bone,
+    /// The bone. If it has sublayers, the setup's thickness of the bone is that of all together.
+    pub bone: CaseBone,
 }

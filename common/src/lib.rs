@@ -15,6 +15,7 @@
 mod accepted;
 pub mod attainable_moments;
 pub mod attenuation;
+pub mod bone;
 pub mod bulk_velocity;
 pub mod carried_velocity;
 pub mod case;

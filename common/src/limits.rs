@@ -7,6 +7,10 @@ pub(crate) const QUALITY_FACTOR_MIN: f64 = 2.0;
 pub const RECEIVERS_MIN: u32 = 3;
 /// Maximum number of receivers of a probe.
 pub const RECEIVERS_MAX: u32 = 64;
+/// Maximum number of solid sublayers of a bone.
+pub const SUBLAYERS_MAX: usize = 16;
+/// Minimum thickness of a sublayer, m: that of one thinner than a lamella of bone loses digits.
+pub const SUBLAYER_THICKNESS_MIN: f64 = 1e-6;
 /// Maximum number of realizations of one evaluation.
 pub const REALIZATIONS_MAX: u64 = 10_000_000;
 /// Maximum number of scrambles of one evaluation: enough to estimate an error, and quick to

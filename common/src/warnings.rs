@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::case::{Case, Setup};
+use crate::case::{Bone, Case, Setup};
 use crate::field_path::entry_path;
 use crate::fields::{self, DeclaredKey, DeclaredValue, Number};
 use crate::job::{Data, JobSpecification, Measurements, Range};
@@ -11,6 +11,7 @@ use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::quantile::quantile;
 use crate::robust::outliers;
+use crate::setup_quantity::SetupQuantity;
 
 use crate::plausible::{self, PlausibleRange, short};
 
@@ -45,11 +46,12 @@ impl fmt::Display for Warning {
 pub fn case_warnings(case: &Case) -> Vec<Warning> {
     let mut warnings = Warnings::default();
     warnings.setup(&case.setup);
-    warnings.number("bone.density", case.bone.density, &plausible::DENSITY);
-    let diagonal = (0..6).map(|i| case.bone.elasticity.rows()[i][i]);
-    let largest = diagonal.fold(0.0, f64::max);
-    if let Some(doubt) = plausible::MODULUS.doubt(largest) {
-        warnings.add("bone", format!("the largest stiffness {doubt}"));
+    if case.bone.sublayers().is_some() {
+        let whole = SetupQuantity::BoneThickness.mean_key();
+        warnings.rename(whole, "bone.sublayers", "the thickness of all together");
+    }
+    for (table, solid) in case.bone.solids() {
+        warnings.solid(&table, solid);
     }
     warnings.0
 }
@@ -87,6 +89,23 @@ impl Warnings {
     fn number(&mut self, field: &str, value: f64, kind: &PlausibleRange) {
         if let Some(doubt) = kind.doubt(value) {
             self.add(field, doubt);
+        }
+    }
+
+    /// Gives the warnings about `field` another one, and what of it they are about.
+    fn rename(&mut self, field: &str, other: &str, what: &str) {
+        for warning in self.0.iter_mut().filter(|warning| warning.field == field) {
+            warning.field = other.to_owned();
+            warning.message = format!("{what} {}", warning.message);
+        }
+    }
+
+    fn solid(&mut self, table: &str, solid: &Bone) {
+        self.number(&entry_path(table, "density"), solid.density, &plausible::DENSITY);
+        let diagonal = (0..6).map(|i| solid.elasticity.rows()[i][i]);
+        let largest = diagonal.fold(0.0, f64::max);
+        if let Some(doubt) = plausible::MODULUS.doubt(largest) {
+            self.add(table, format!("the largest stiffness {doubt}"));
         }
     }
 

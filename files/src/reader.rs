@@ -48,6 +48,11 @@ pub(crate) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
+    /// Returns the path of the table itself.
+    pub(crate) fn own_path(&self) -> &str {
+        &self.path
+    }
+
     /// Returns the path of an entry.
     pub(crate) fn path(&self, key: &str) -> String {
         entry_path(&self.path, key)

@@ -3,14 +3,17 @@
 
 use std::fmt::{self, Write as _};
 
+use osteon_common::bone::{Bone, CaseBone};
 use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::Elasticity;
+use osteon_common::field_path::entry_path;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, Section, entries};
 use osteon_common::job::{
     Data, Group, JobSpecification, Measurements, PosteriorSettings, Prior, Range, Search,
 };
 use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::Parameter;
+use osteon_common::setup_quantity::SetupQuantity;
 
 /// Number of velocities per line of an inlined data set.
 const NUMBERS_PER_LINE: usize = 6;
@@ -21,9 +24,19 @@ const NUMBERS_PER_LINE: usize = 6;
 /// finite and above 0.
 pub fn case(case: &Case) -> String {
     written(|out| {
-        setup(out, &case.setup)?;
-        writeln!(out, "\n[bone]\ndensity = {:?}  # kg/m³", case.bone.density)?;
-        mandel(out, &case.bone.elasticity)
+        let sublayers = match &case.bone {
+            CaseBone::Homogeneous(bone) => {
+                setup(out, &case.setup, &[])?;
+                writeln!(out, "\n[bone]")?;
+                return solid(out, bone);
+            }
+            CaseBone::Layered(sublayers) => sublayers,
+        };
+        setup(out, &case.setup, &[SetupQuantity::BoneThickness.mean_key()])?;
+        sublayers.iter().try_for_each(|sublayer| {
+            writeln!(out, "\n[[bone.sublayers]]\nthickness = {:?}  # m", sublayer.thickness)?;
+            solid(out, &sublayer.solid)
+        })
     })
 }
 
@@ -33,7 +46,7 @@ pub fn case(case: &Case) -> String {
 /// [`JobSpecification::check`].
 pub fn job(specification: &JobSpecification) -> String {
     written(|out| {
-        setup(out, &specification.setup)?;
+        setup(out, &specification.setup, &[])?;
         if let Some(given) = &specification.data {
             data(out, given)?;
         }
@@ -51,21 +64,39 @@ fn written(write: impl FnOnce(&mut String) -> fmt::Result) -> String {
     out
 }
 
-fn setup(out: &mut String, setup: &Setup) -> fmt::Result {
+/// Writes the sections of a setup without the keys with these paths.
+fn setup(out: &mut String, setup: &Setup, left_out: &[&str]) -> fmt::Result {
     let mut setup = *setup;
     for (index, (key, declared)) in setup.sections().into_iter().enumerate() {
         if index > 0 {
             writeln!(out)?;
         }
-        section(out, key, declared)?;
+        let mut entries = entries(declared);
+        leave_out(&mut entries, key.name, left_out);
+        write_entries(out, key, &entries)?;
     }
     Ok(())
 }
 
+/// Removes the keys with these paths from the entries of a table.
+fn leave_out(entries: &mut Vec<DeclaredKey>, table: &str, paths: &[&str]) {
+    entries.retain_mut(|entry| {
+        let path = entry_path(table, entry.key.name);
+        if let DeclaredValue::Table(entries) = &mut entry.value {
+            leave_out(entries, &path, paths);
+        }
+        !paths.contains(&path.as_str())
+    });
+}
+
 /// Writes a section: each key on a line, with its unit as a comment.
 fn section(out: &mut String, key: Key, section: &mut dyn Section) -> fmt::Result {
+    write_entries(out, key, &entries(section))
+}
+
+fn write_entries(out: &mut String, key: Key, entries: &[DeclaredKey]) -> fmt::Result {
     writeln!(out, "[{}]", key.name)?;
-    for entry in entries(section).iter().filter(|entry| entry.applies()) {
+    for entry in entries.iter().filter(|entry| entry.applies()) {
         let Some(value) = value(&entry.value) else { continue };
         write!(out, "{} = {value}", entry.key.name)?;
         let mut units = Vec::new();
@@ -110,6 +141,12 @@ fn units_of(value: &DeclaredValue, units: &mut Vec<&'static str>) {
         }
         _ => {}
     }
+}
+
+/// Writes the keys of a solid.
+fn solid(out: &mut String, solid: &Bone) -> fmt::Result {
+    writeln!(out, "density = {:?}  # kg/m³", solid.density)?;
+    mandel(out, &solid.elasticity)
 }
 
 fn mandel(out: &mut String, elasticity: &Elasticity) -> fmt::Result {

@@ -8,6 +8,7 @@ mod hybrid_job;
 use std::path::{Path, PathBuf};
 
 use osteon_common::attenuation::Attenuation;
+use osteon_common::bone::{Bone, CaseBone};
 use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::EngineeringConstants;
 use osteon_common::job::{
@@ -21,7 +22,7 @@ use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_files::document::Format;
-use osteon_files::{case_file, job_file};
+use osteon_files::{case_file, job_file, materials};
 
 /// All seven parameters and the data's moments: what has no default.
 const MINIMAL: &str = "
@@ -49,6 +50,8 @@ fn case(text: &str, format: Format) -> Case {
 fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/cases").join(name)
 }
+
+const SUBLAYERS: &str = include_str!("files/sublayers.toml");
 
 const LOSSLESS: Attenuation = Attenuation { quality_factor: None, reference_frequency: 1e6 };
 
@@ -333,10 +336,31 @@ fn toml_and_json_say_the_same() {
         include_str!("files/case.toml"),
         include_str!("files/mandel.toml"),
         include_str!("files/porosity.toml"),
+        SUBLAYERS,
     ];
     for text in cases {
         assert_eq!(case(text, Format::Toml), case(&as_json(text), Format::Json));
     }
+}
+
+#[test]
+fn sublayers_are_read_downwards_and_add_up_to_the_thickness() {
+    let case = case(SUBLAYERS, Format::Toml);
+    let layers = Layers {
+        bone_thickness: 1.5e-3 + 2e-3 + 0.5e-3,
+        bone_attenuation: Attenuation { quality_factor: Some(20.0), ..LOSSLESS },
+        ..DEFAULT_SETUP.layers
+    };
+    assert_eq!(case.setup, Setup { layers, ..DEFAULT_SETUP });
+    let sublayers = case.bone.sublayers().unwrap();
+    let thicknesses: Vec<f64> = sublayers.iter().map(|sublayer| sublayer.thickness).collect();
+    assert_eq!(thicknesses, [1.5e-3, 2e-3, 0.5e-3]);
+    let densities: Vec<f64> = sublayers.iter().map(|sublayer| sublayer.solid.density).collect();
+    let femur = materials::named("human-femur-ashman-1984").unwrap();
+    assert_eq!(densities, [1900.0, femur.density, 1700.0]);
+    assert_eq!(sublayers.lower()[1].solid.elasticity.rows()[5][5], 10.4e9);
+    assert_eq!(sublayers.lower()[0].solid.elasticity, femur.constants().elasticity().unwrap());
+    assert_eq!(case_file::parse(&case_file::to_toml(&case), Format::Toml).unwrap(), case);
 }
 
 #[test]
@@ -356,17 +380,18 @@ fn the_example_cases_are_what_they_say() {
     };
     let a = case_file::read(&example("A.toml")).unwrap();
     assert_eq!(a.setup, DEFAULT_SETUP);
-    assert_eq!(a.bone.density, 1598.8);
-    assert_eq!(a.bone.elasticity, optimum.elasticity().unwrap());
+    let elasticity = optimum.elasticity().unwrap();
+    assert_eq!(a.bone, CaseBone::Homogeneous(Bone { density: 1598.8, elasticity }));
     for (name, thickness) in [("D", 4e-3), ("G", 3e-3)] {
         let read = case_file::read(&example(&format!("{name}.toml"))).unwrap();
         let mut setup = DEFAULT_SETUP;
         setup.layers.bone_thickness = thickness;
         assert_eq!(read.setup, setup);
+        let CaseBone::Homogeneous(bone) = read.bone else { panic!("{name} has sublayers") };
         let reference = reference(name);
         assert_eq!(reference["thickness"].as_f64().unwrap(), thickness);
-        assert_eq!(reference["density"].as_f64().unwrap(), read.bone.density);
-        for (i, row) in read.bone.elasticity.rows().iter().enumerate() {
+        assert_eq!(reference["density"].as_f64().unwrap(), bone.density);
+        for (i, row) in bone.elasticity.rows().iter().enumerate() {
             for (j, &entry) in row.iter().enumerate() {
                 // The reference's mirrored entries may differ in their last bits.
                 let expected = reference["mandel"][i][j].as_f64().unwrap();

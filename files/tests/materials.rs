@@ -6,6 +6,8 @@ mod support;
 
 use std::path::Path;
 
+use osteon_common::bone::{Bone, CaseBone};
+use osteon_common::case::Case;
 use osteon_common::job::{JobKind, JobSpecification, Range};
 use osteon_common::parameters::Parameter;
 use osteon_files::document::Format;
@@ -21,23 +23,29 @@ fn job(parameters: &str) -> Result<JobSpecification, String> {
         .map_err(|error| error.to_string())
 }
 
-fn case(bone: &str) -> Result<osteon_common::case::Case, String> {
+fn case(bone: &str) -> Result<Case, String> {
     case_file::parse(bone, Format::Toml).map_err(|error| error.to_string())
+}
+
+fn bone(text: &str) -> Bone {
+    match case(text) {
+        Ok(Case { bone: CaseBone::Homogeneous(bone), .. }) => bone,
+        other => panic!("{other:?}"),
+    }
 }
 
 #[test]
 fn a_case_has_the_values_of_its_material() {
     let tibia = materials::named(NAME).unwrap_or_else(|| panic!("{NAME}"));
-    let named =
-        case(&format!("bone = {{ material = \"{NAME}\" }}")).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(named.bone.density, tibia.density);
-    assert_eq!(Ok(named.bone.elasticity), tibia.constants().elasticity());
+    let named = bone(&format!("bone = {{ material = \"{NAME}\" }}"));
+    assert_eq!(named.density, tibia.density);
+    assert_eq!(Ok(named.elasticity), tibia.constants().elasticity());
     // A key beside the name replaces the material's value.
     let lighter =
         format!("[bone]\ndensity = 1800\ntransverse_poisson_ratio = 0.4\nmaterial = \"{NAME}\"");
-    let lighter = case(&lighter).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(lighter.bone.density, 1800.0);
-    let constants = lighter.bone.elasticity.engineering_constants();
+    let lighter = bone(&lighter);
+    assert_eq!(lighter.density, 1800.0);
+    let constants = lighter.elasticity.engineering_constants();
     assert!((constants.transverse_poisson_ratio - 0.4).abs() < 1e-9, "{constants:?}");
     let modulus = tibia.constants().longitudinal_young_modulus;
     assert!((constants.longitudinal_young_modulus / modulus - 1.0).abs() < 1e-9, "{constants:?}");

@@ -4,6 +4,7 @@
 
 mod support;
 
+use osteon_common::bone::CaseBone;
 use osteon_common::case::Case;
 use osteon_common::elasticity::EngineeringConstants;
 use osteon_common::porosity::{BoneMatrix, Homogenisation, PoreFluid, PorosityModel};
@@ -18,13 +19,17 @@ fn case(text: &str) -> Result<Case, String> {
     case_file::parse(text, Format::Toml).map_err(|error| error.to_string())
 }
 
+fn homogeneous(model: &PorosityModel, porosity: f64) -> CaseBone {
+    CaseBone::Homogeneous(model.bone(porosity).unwrap())
+}
+
 #[test]
 fn a_case_has_the_bone_of_its_porosity() {
     let read = case("bone = { porosity = 0.1 }").unwrap();
-    assert_eq!(Ok(read.bone), PorosityModel::default().bone(0.1));
+    assert_eq!(read.bone, homogeneous(&PorosityModel::default(), 0.1));
     // A whole number is a number, too, and bone without pores is the matrix.
     let read = case("bone = { porosity = 0 }").unwrap();
-    assert_eq!(Ok(read.bone), PorosityModel::default().bone(0.0));
+    assert_eq!(read.bone, homogeneous(&PorosityModel::default(), 0.0));
 }
 
 #[test]
@@ -43,12 +48,35 @@ fn every_key_of_the_model_counts() {
         },
         fluid: PoreFluid { bulk_modulus: 2.2e9, density: 950.0 },
     };
-    assert_eq!(Ok(case(EVERY_KEY).unwrap().bone), model.bone(0.12));
+    assert_eq!(case(EVERY_KEY).unwrap().bone, homogeneous(&model, 0.12));
     // Keys that are left out have their defaults.
     let lighter = "[bone]\nporosity = 0.2\nporosity_model = { matrix = { density = 1900 } }";
     let mut model = PorosityModel::default();
     model.matrix.density = 1900.0;
-    assert_eq!(Ok(case(lighter).unwrap().bone), model.bone(0.2));
+    assert_eq!(case(lighter).unwrap().bone, homogeneous(&model, 0.2));
+}
+
+#[test]
+fn sublayers_have_porosities_by_the_model_of_the_bone() {
+    let text = |model: &str| {
+        format!(
+            "[bone]\n{model}\n[[bone.sublayers]]\nthickness = 2e-3\nporosity = 0.05\n\
+             [[bone.sublayers]]\nthickness = 1e-3\nporosity = 0.15\n"
+        )
+    };
+    let mut model = PorosityModel::default();
+    for given in ["", "porosity_model = { homogenisation = \"self_consistent\" }"] {
+        let CaseBone::Layered(sublayers) = case(&text(given)).unwrap().bone else {
+            panic!("not layered");
+        };
+        let solids: Vec<_> = sublayers.iter().map(|one| one.solid).collect();
+        assert_eq!(solids, [0.05, 0.15].map(|porosity| model.bone(porosity).unwrap()));
+        model.homogenisation = Homogenisation::SelfConsistent;
+    }
+    let refused = case(&text("").replace("0.15", "0.6")).unwrap_err();
+    assert!(refused.contains("bone.sublayers[1].porosity: is 0.6"), "{refused}");
+    let refused = case(&text("porosity = 0.1")).unwrap_err();
+    assert!(refused.contains("bone.porosity: is given together with sublayers"), "{refused}");
 }
 
 /// As with a material, nothing but the values goes on.

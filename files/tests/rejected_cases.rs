@@ -13,6 +13,7 @@ use support::pin;
 
 const CASE: &str = include_str!("files/case.toml");
 const MANDEL: &str = include_str!("files/mandel.toml");
+const SUBLAYERS: &str = include_str!("files/sublayers.toml");
 
 fn refusal(text: &str, format: Format) -> String {
     match case_file::parse(text, format) {
@@ -104,6 +105,40 @@ fn mandel() {
 }
 
 #[test]
+fn sublayers() {
+    let first = "[[bone.sublayers]]\nthickness = 1.5e-3";
+    let too_many = format!("{}{first}", "[[bone.sublayers]]\nthickness = 1e-3\n".repeat(14));
+    check(
+        "rejected_sublayers",
+        SUBLAYERS,
+        &[
+            ("thickness = 1.5e-3\n", ""),
+            ("thickness = 1.5e-3", "thickness = 0.0"),
+            ("thickness = 1.5e-3", "thickness = 1.5e-7"),
+            ("thickness = 1.5e-3", "thickness = 1.5"),
+            ("thickness = 1.5e-3", "thickness = \"1.5e-3\""),
+            ("thickness = 1.5e-3", "thicknes = 1.5e-3"),
+            ("density = 1900.0\n", ""),
+            ("density = 1900.0", "density = 1.9"),
+            ("density = 1700", "density = -1700"),
+            ("longitudinal_poisson_ratio = 0.35", "longitudinal_poisson_ratio = 0.8"),
+            ("transverse_young_modulus = 11e9\n", ""),
+            ("[0, 0, 0, 0, 0, 10.4e9]", "[0, 0, 0, 0, 0, 0]"),
+            ("[0, 0, 0, 0, 0, 10.4e9]", "[0, 0, 0, 0, 10.4e9]"),
+            ("density = 1700", "density = 1700\nmaterial = \"bone\""),
+            ("bone = {", "bone = { thickness = 4e-3,"),
+            (first, &format!("[bone]\ndensity = 1800\n{first}")),
+            (first, &format!("[bone]\nmandel = []\n{first}")),
+            (first, &too_many),
+        ],
+    );
+    let inputs = ["[]", "3", "[3]", "[{ }, { }, { }, { }]"];
+    let bone = |list: &str| format!("[bone]\nsublayers = {list}\n");
+    let refusals = inputs.map(|list| (list, refusal(&bone(list), Format::Toml)));
+    pin("rejected_sublayers_list", refusals);
+}
+
+#[test]
 fn json_has_the_same_messages_without_lines() {
     let inputs = [
         "{\"bone\": {\"density\": -1, \"mandle\": []}}",
@@ -155,7 +190,7 @@ fn files_that_cannot_be_read() {
         "d.TOML",
         Some(b""),
         "DIR/d.TOML: 1 error\n  bone: is missing; it must have a material, or density and either the five \
-         engineering constants or mandel, or a porosity",
+         engineering constants or mandel, or a porosity, or sublayers",
     );
     assert!(case_file::read(directory.path()).is_err());
 }

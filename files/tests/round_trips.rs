@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use osteon_common::attenuation::Attenuation;
-use osteon_common::case::{Bone, Case, Setup};
+use osteon_common::bone::{Bone, CaseBone, Sublayer, Sublayers};
+use osteon_common::case::{Case, Setup};
 use osteon_common::data::numbered;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::job::{
@@ -15,6 +16,7 @@ use osteon_common::job::{
 };
 use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::layers::{Fluid, Layers};
+use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::probe::{Probe, Receivers, Source};
@@ -121,8 +123,20 @@ fn elasticity() -> impl Strategy<Value = Elasticity> {
 }
 
 fn case() -> impl Strategy<Value = Case> {
-    (setup(), positive(), elasticity())
-        .prop_map(|(setup, density, elasticity)| Case { setup, bone: Bone { density, elasticity } })
+    let solid = || {
+        (positive(), elasticity()).prop_map(|(density, elasticity)| Bone { density, elasticity })
+    };
+    let sublayer = (1e-6..5e-3, solid());
+    let sublayer = sublayer.prop_map(|(thickness, solid)| Sublayer { thickness, solid });
+    // In half of the cases too many for a bone, which is then homogeneous.
+    let sublayers = prop::collection::vec(sublayer, 0..=2 * SUBLAYERS_MAX);
+    (setup(), solid(), sublayers).prop_map(|(mut setup, solid, sublayers)| {
+        let Some(sublayers) = Sublayers::new(&sublayers) else {
+            return Case { setup, bone: solid.into() };
+        };
+        setup.layers.bone_thickness = sublayers.thickness();
+        Case { setup, bone: CaseBone::Layered(sublayers) }
+    })
 }
 
 fn range(lower: f64, upper: f64) -> impl Strategy<Value = Range> {
@@ -409,7 +423,7 @@ properties! {
         let read = case_file::parse(&text, Format::Toml).unwrap();
         // The text tells all bits, a zero's sign among them.
         prop_assert_eq!(case_file::to_toml(&read), text.clone());
-        prop_assert_eq!(read, case);
+        prop_assert_eq!(&read, &case);
         prop_assert_eq!(case_file::parse(&as_json(&text)?, Format::Json).unwrap(), case);
     }
 

@@ -13,6 +13,7 @@ use osteon_files::{case_file, job_file};
 const JOB: &str = include_str!("files/job.toml");
 const CASE: &str = include_str!("files/case.toml");
 const MANDEL: &str = include_str!("files/mandel.toml");
+const SUBLAYERS: &str = include_str!("files/sublayers.toml");
 
 fn shown(warnings: &[Warning]) -> Vec<String> {
     warnings.iter().map(Warning::to_string).collect()
@@ -118,6 +119,19 @@ fn unusual_numbers_of_a_case_are_accepted_with_a_warning() {
             "bone.density: is 1.8 kg/m³; usual is 300 to 6000 kg/m³; did you mean 1.8 g/cm³ (1.8e3)?",
         ),
         (CASE, modulus, "transverse_young_modulus = 2e6", ""),
+        (
+            SUBLAYERS,
+            "density = 1700",
+            "density = 17000",
+            "bone.sublayers[2].density: is 17000 kg/m³; usual is 300 to 6000 kg/m³",
+        ),
+        (
+            SUBLAYERS,
+            "thickness = 2e-3",
+            "thickness = 40e-3",
+            "bone.sublayers: the thickness of all together is 0.042 m; usual is 0.0002 to 0.03 m",
+        ),
+        (SUBLAYERS, "thickness = 2e-3", "thickness = 2e-6", ""),
     ] {
         let case = case_file::parse(&edited(text, from, to), Format::Toml).unwrap();
         let expected: Vec<&str> =

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Instant;
 
-use osteon_common::case::Bone;
+use osteon_common::bone::{Bone, CaseBone};
 use osteon_common::elasticity::Elasticity;
 use osteon_files::case_file;
 use osteon_solver::{Isa, Solver, Workspace};
@@ -40,6 +40,9 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
     };
     let (threads, count): (usize, usize) = (threads.parse()?, count.parse()?);
     let case = case_file::read(Path::new(case))?;
+    let CaseBone::Homogeneous(Bone { density, .. }) = case.bone else {
+        return Err("the bone has sublayers".into());
+    };
     let solver = Solver::with_isa(&case.setup, Isa::chosen(env::var_os(Isa::VARIABLE))?);
     let mut input = io::stdin().lock();
     let mut bones = Vec::new();
@@ -50,7 +53,7 @@ fn run() -> Result<(), Box<dyn std::error::Error>> {
             input.read_exact(&mut bytes)?;
             *entry = f64::from_ne_bytes(bytes);
         }
-        bones.push(Bone { density: case.bone.density, elasticity: Elasticity::new(tensor)? });
+        bones.push(Bone { density, elasticity: Elasticity::new(tensor)? });
     }
     let mut output = io::stdout().lock();
     while input.read(&mut [0])? == 1 {

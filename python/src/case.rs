@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use numpy::{PyArray1, PyArray2};
+use osteon_common::bone::{Bone, CaseBone};
 use osteon_common::case::Case;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::warnings::case_warnings;
@@ -28,6 +29,19 @@ type PlainArrival<'py> =
 /// Times and pressures.
 type PlainTraces<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
+impl PyCase {
+    /// Returns the solid of a bone without sublayers, of which `what` is asked for.
+    fn homogeneous(&self, what: &str) -> PyResult<&Bone> {
+        match &self.case.bone {
+            CaseBone::Homogeneous(bone) => Ok(bone),
+            CaseBone::Layered(_) => {
+                let message = format!("have a {what} each; the bone as a whole has none");
+                Err(errors::bad_input("bone.sublayers", message))
+            }
+        }
+    }
+}
+
 #[pymethods]
 impl PyCase {
     /// Reads and checks a case file (TOML or JSON).
@@ -52,14 +66,14 @@ impl PyCase {
 
     /// Density of the bone, kg/m³.
     #[getter]
-    fn density(&self) -> f64 {
-        self.case.bone.density
+    fn density(&self) -> PyResult<f64> {
+        self.homogeneous("density").map(|bone| bone.density)
     }
 
     /// Elasticity of the bone, Pa, as an array (6, 6): Kelvin-Mandel, order 11 22 33 23 31 12.
     #[getter]
     fn tensor<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let rows = self.case.bone.elasticity.rows();
+        let rows = self.homogeneous("tensor")?.elasticity.rows();
         PyArray2::from_vec2(py, &rows.map(|row| row.to_vec())).map_err(PyErr::from)
     }
 
@@ -75,13 +89,13 @@ impl PyCase {
         case_warnings(&self.case).iter().map(ToString::to_string).collect()
     }
 
-    /// The same case with another bone: elasticity in Pa (6, 6), density in kg/m³.
+    /// The same case with another bone of the same thickness, without sublayers: elasticity in Pa
+    /// (6, 6), density in kg/m³.
     fn with_bone(&self, tensor: [[f64; 6]; 6], density: f64) -> PyResult<Self> {
-        let mut case = self.case;
-        case.bone.elasticity = Elasticity::new(tensor)
+        let elasticity = Elasticity::new(tensor)
             .map_err(|error| errors::bad_input("tensor", error.to_string()))?;
-        case.bone.density = density_of(density, "density")?;
-        Ok(Self { case })
+        let bone = Bone { density: density_of(density, "density")?, elasticity };
+        Ok(Self { case: Case { setup: self.case.setup, bone: bone.into() } })
     }
 
     fn __eq__(&self, other: &Self) -> bool {

@@ -44,7 +44,7 @@ pub(crate) fn velocities_of_cases<'py>(
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<PlainVelocities<'py>> {
-    let cases: Vec<_> = cases.iter().map(|case| case.get().case).collect();
+    let cases: Vec<_> = cases.iter().map(|case| case.get().case.clone()).collect();
     // Runs of one setup are computed together, with tables that they share.
     let mut outcomes: Vec<Outcome> = Vec::with_capacity(cases.len());
     for group in cases.chunk_by(|one, next| one.setup == next.setup) {

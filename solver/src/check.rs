@@ -101,7 +101,7 @@ fn settings(given: &SolverSettings) -> [SolverSettings; 3] {
 
 #[cfg(test)]
 mod tests {
-    use osteon_common::case::Bone;
+    use osteon_common::bone::Bone;
     use osteon_common::parameters::Point;
 
     use super::*;
@@ -128,8 +128,10 @@ mod tests {
 
     fn check(thickness: f64) -> Check {
         let elasticity = OPTIMUM.constants().elasticity().unwrap();
-        let mut case =
-            Case { setup: Setup::default(), bone: Bone { density: OPTIMUM.density(), elasticity } };
+        let mut case = Case {
+            setup: Setup::default(),
+            bone: Bone { density: OPTIMUM.density(), elasticity }.into(),
+        };
         case.setup.layers.bone_thickness = thickness;
         Check::run(&case, Isa::fastest())
     }

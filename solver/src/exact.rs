@@ -22,13 +22,16 @@ mod bin_tables;
 mod blending;
 pub(crate) mod direct;
 mod estimated;
+mod factors;
 mod grade_caches;
 pub(crate) mod growth;
 pub(crate) mod guided;
 mod height_factors;
+mod layer;
 pub(crate) mod pass;
 mod passes;
 pub(crate) mod plate;
+mod plate_stack;
 mod prepared_setup;
 #[cfg(feature = "measure")]
 pub(crate) mod quantities;
@@ -40,14 +43,14 @@ pub mod stages;
 pub(crate) mod table_cache;
 pub(crate) mod table_memory;
 pub(crate) mod tables;
-pub(crate) mod tensor;
 pub(crate) mod tilted;
 pub(crate) mod traces;
 mod weights;
 
 use std::sync::Arc;
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::BoneRef;
+use osteon_common::case::Setup;
 use osteon_common::probe::Place;
 use osteon_common::sampling::{self, OuterFaces};
 
@@ -96,14 +99,14 @@ impl Exact {
 
     pub(crate) fn arrival(
         &self,
-        bone: &Bone,
+        bone: BoneRef<'_>,
         workspace: &mut ExactWorkspace,
     ) -> Result<Arrival, Failure> {
-        let (medium, speed) = self.prepared.solid(bone)?;
+        let (media, speed) = self.prepared.media(bone)?;
         let bin =
             sampling::speed_bin(&self.prepared.setup, speed).ok_or_else(|| too_large(speed))?;
         let caches = &self.without_faces;
-        let mut passes = BonePasses::new(&self.prepared, caches, &medium, speed, bin, workspace);
+        let mut passes = BonePasses::new(&self.prepared, caches, &media, speed, bin, workspace);
         let mut found = passes.run_in_bins();
         if self.needs_faces(&found, speed) {
             passes.caches = &self.with_faces;

@@ -2,7 +2,8 @@
 
 use std::f64::consts::LN_10;
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::BoneRef;
+use osteon_common::case::Setup;
 use osteon_common::observables::{Observable, ObservableSet, PerObservable};
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::Ensemble;
@@ -74,7 +75,9 @@ impl Solver {
         let needs_other =
             observables[Observable::OtherVelocity] || observables[Observable::CenterFrequency];
         let other = match needs_other {
-            true => Some(solver.other_arrival(&bone, workspace).map_err(|failure| failure.kind)?),
+            true => Some(
+                solver.other_arrival((&bone).into(), workspace).map_err(|failure| failure.kind)?,
+            ),
             false => None,
         };
         let value = |observable| match (observable, &other) {
@@ -111,13 +114,13 @@ impl Solver {
 
     /// Computes the other observables of the first signal of a bone, of which `arrival` is the arrival.
     /// The case is solved once more, with the other extremum.
-    pub fn first_signal(
+    pub fn first_signal<'a>(
         &self,
-        bone: &Bone,
+        bone: impl Into<BoneRef<'a>>,
         arrival: &Arrival,
         workspace: &mut Workspace,
     ) -> FirstSignal {
-        let other = self.other_arrival(bone, workspace);
+        let other = self.other_arrival(bone.into(), workspace);
         FirstSignal {
             other_extremum: self.setup().picking.extremum.other(),
             decay: self.decay(arrival),
@@ -127,7 +130,11 @@ impl Solver {
     }
 
     /// Returns the arrival of the extremum that the case does not pick.
-    fn other_arrival(&self, bone: &Bone, workspace: &mut Workspace) -> Result<Arrival, Failure> {
+    fn other_arrival(
+        &self,
+        bone: BoneRef<'_>,
+        workspace: &mut Workspace,
+    ) -> Result<Arrival, Failure> {
         let setup = self.setup();
         let picking = Picking { extremum: setup.picking.extremum.other(), ..setup.picking };
         self.with_setup(&Setup { picking, ..*setup }).arrival(bone, workspace)

@@ -43,7 +43,8 @@ mod samples;
 mod scope;
 mod stepping;
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::BoneRef;
+use osteon_common::case::Setup;
 use osteon_common::outcome::Outcome;
 
 #[cfg(feature = "measure")]
@@ -94,12 +95,22 @@ impl Hybrid {
     /// # Errors
     /// The failure, if the case has no velocity; `NoConvergence` also if the time step is above
     /// the stability limit, or the computation exceeds its limits.
-    pub fn arrival(
+    pub fn arrival<'a>(
         &self,
-        bone: &Bone,
+        bone: impl Into<BoneRef<'a>>,
         workspace: &mut HybridWorkspace,
     ) -> Result<Arrival, Failure> {
-        let speed = Medium::new(bone).fastest.max(self.setup.layers.marrow.sound_speed);
+        self.arrival_of(bone.into(), workspace)
+    }
+
+    fn arrival_of(
+        &self,
+        bone: BoneRef<'_>,
+        workspace: &mut HybridWorkspace,
+    ) -> Result<Arrival, Failure> {
+        let bone = bone.sublayers(self.setup.layers.bone_thickness);
+        let solids = bone.iter().map(|sublayer| Medium::new(&sublayer.solid).fastest);
+        let speed = solids.fold(self.setup.layers.marrow.sound_speed, f64::max);
         if !speed.is_finite() {
             return Err(speed_not_finite());
         }
@@ -109,7 +120,7 @@ impl Hybrid {
             setup: &self.setup,
             distances: &self.distances,
             isa: self.isa,
-            bone,
+            bone: &bone,
             whole: Scope::until_direct_wave(&self.setup, speed),
             memory,
             windows,
@@ -120,7 +131,11 @@ impl Hybrid {
     }
 
     /// Computes the velocity of one bone, m/s, or the kind of failure: what a job keeps of an arrival.
-    pub fn outcome(&self, bone: &Bone, workspace: &mut HybridWorkspace) -> Outcome {
+    pub fn outcome<'a>(
+        &self,
+        bone: impl Into<BoneRef<'a>>,
+        workspace: &mut HybridWorkspace,
+    ) -> Outcome {
         self.arrival(bone, workspace)
             .map(|arrival| arrival.velocity)
             .map_err(|failure| failure.kind)

@@ -24,6 +24,7 @@ mod first_signal;
 pub mod hybrid;
 mod isa;
 mod lanes;
+mod media;
 mod medium;
 mod picking;
 mod pulse;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::BoneRef;
+use osteon_common::case::Setup;
 use osteon_common::observables::ObservableSet;
 use osteon_common::outcome::{Outcome, RealizationResult};
 use osteon_common::realization::Ensemble;
@@ -115,7 +116,15 @@ impl Solver {
     ///
     /// # Errors
     /// The failure, if the case has no velocity.
-    pub fn arrival(&self, bone: &Bone, workspace: &mut Workspace) -> Result<Arrival, Failure> {
+    pub fn arrival<'a>(
+        &self,
+        bone: impl Into<BoneRef<'a>>,
+        workspace: &mut Workspace,
+    ) -> Result<Arrival, Failure> {
+        self.arrival_of(bone.into(), workspace)
+    }
+
+    fn arrival_of(&self, bone: BoneRef<'_>, workspace: &mut Workspace) -> Result<Arrival, Failure> {
         let found = match self.setup.solver.method {
             Method::Exact => self.exact.arrival(bone, &mut workspace.exact),
             Method::Hybrid => self.hybrid.arrival(bone, &mut workspace.hybrid),
@@ -136,7 +145,7 @@ impl Solver {
     }
 
     /// Computes the velocity of one bone, m/s, or the kind of failure: what a job keeps of an arrival.
-    pub fn outcome(&self, bone: &Bone, workspace: &mut Workspace) -> Outcome {
+    pub fn outcome<'a>(&self, bone: impl Into<BoneRef<'a>>, workspace: &mut Workspace) -> Outcome {
         self.arrival(bone, workspace)
             .map(|arrival| arrival.velocity)
             .map_err(|failure| failure.kind)

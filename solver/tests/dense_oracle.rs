@@ -9,10 +9,11 @@ use std::f64::consts::{PI, TAU};
 use faer::prelude::Solve as _;
 use faer::{Mat, c64};
 use osteon_common::attenuation::Attenuation;
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::{Bone, BoneRef, Sublayer, Sublayers};
+use osteon_common::case::Setup;
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
-use osteon_solver::{Complex, admittance};
+use osteon_solver::{Complex, Solver, admittance};
 
 /// A bone whose moduli are all multiplied by a complex factor.
 struct Plate<'a> {
@@ -49,15 +50,28 @@ fn system(plate: &Plate<'_>, k: f64, s: c64, unit: f64) -> Mat<c64> {
     })
 }
 
-/// û3(0)/p̂(0) with the lower face loaded by τ3 = `load` u3.
-fn dense_admittance(plate: &Plate<'_>, h: f64, k: f64, s: c64, load: c64) -> c64 {
-    let unit = plate.bone.elasticity.rows()[0][0] / h;
+/// (u, τ) at the top = this · (u, τ) at the bottom of a plate of thickness `h`.
+fn transfer(plate: &Plate<'_>, h: f64, k: f64, s: c64, unit: f64) -> Mat<c64> {
     let eigen = system(plate, k, s, unit).eigen().unwrap();
     let vectors = eigen.U().to_owned();
     let stretched = Mat::from_fn(6, 6, |i, j| vectors[(i, j)] * (eigen.S()[j] * h).exp());
     let identity: Mat<c64> = Mat::identity(6, 6);
-    // (u, τ) at the top = transfer · (u, τ) at the bottom, where τ = (0, 0, load u3).
-    let transfer = stretched * vectors.partial_piv_lu().solve(&identity);
+    stretched * vectors.partial_piv_lu().solve(&identity)
+}
+
+/// The same of plates on each other, given with their thicknesses, downwards.
+fn transfer_of_all(plates: &[(f64, Plate<'_>)], k: f64, s: c64, unit: f64) -> Mat<c64> {
+    plates
+        .iter()
+        .fold(Mat::identity(6, 6), |above, (h, plate)| above * transfer(plate, *h, k, s, unit))
+}
+
+/// û3(0)/p̂(0) of plates with the lowest face loaded by τ3 = `load` u3.
+fn dense_admittance(plates: &[(f64, Plate<'_>)], k: f64, s: c64, load: c64) -> c64 {
+    let thickness: f64 = plates.iter().map(|(h, _)| h).sum();
+    let unit = plates[0].1.bone.elasticity.rows()[0][0] / thickness;
+    let transfer = transfer_of_all(plates, k, s, unit);
+    // At the bottom τ = (0, 0, load u3).
     let from_bottom = Mat::from_fn(6, 3, |i, j| {
         let loaded = if j == 2 { transfer[(i, 5)] * load / unit } else { c64::new(0.0, 0.0) };
         transfer[(i, j)] + loaded
@@ -102,8 +116,26 @@ fn attenuated_plates_agree_with_dense_eigenvectors() {
     }
 }
 
-fn check(setup: &Setup) {
+/// Compares the admittance of a bone with that of the same plates by dense algebra.
+fn check_admittance(setup: &Setup, plates: &[(f64, Bone)], bone: BoneRef<'_>, what: &str) {
     let marrow = setup.layers.marrow;
+    for (k, omega) in [(300.0, 1e6), (-1500.0, 6e6), (4000.0, 9e6), (9000.0, 2e7)] {
+        let s = c64::new(1.2e6, omega);
+        let squared = marrow.sound_speed * marrow.sound_speed;
+        let squared = constant_quality(&marrow.attenuation, s) * squared;
+        let g = (s * s / squared + k * k).sqrt();
+        let load = s * s * marrow.density * (g * marrow.thickness).tanh() / g;
+        let factor = constant_quality(&setup.layers.bone_attenuation, s);
+        let plates: Vec<_> = plates.iter().map(|(h, bone)| (*h, Plate { bone, factor })).collect();
+        let expected = dense_admittance(&plates, k, s, load);
+        let found = admittance(setup, bone, k, Complex::new(s.re, s.im));
+        let error = (c64::new(found.re, found.im) - expected).norm() / expected.norm();
+        // Exponentials up to e⁸ cost the dense side up to seven of its sixteen digits.
+        assert!(error < 1e-9, "{setup:?}, {what}, k {k}: {error:e}");
+    }
+}
+
+fn check(setup: &Setup) {
     let seed = 21;
     for dispersion in [0.1, 0.4, 0.7] {
         let point =
@@ -111,23 +143,75 @@ fn check(setup: &Setup) {
         let ensemble = Ensemble::new(&point, seed).unwrap();
         for index in 0..10 {
             let bone = ensemble.bone(index).unwrap();
-            for (k, omega) in [(300.0, 1e6), (-1500.0, 6e6), (4000.0, 9e6), (9000.0, 2e7)] {
-                let s = c64::new(1.2e6, omega);
-                let squared = marrow.sound_speed * marrow.sound_speed;
-                let squared = constant_quality(&marrow.attenuation, s) * squared;
-                let g = (s * s / squared + k * k).sqrt();
-                let load = s * s * marrow.density * (g * marrow.thickness).tanh() / g;
-                let factor = constant_quality(&setup.layers.bone_attenuation, s);
-                let plate = Plate { bone: &bone, factor };
-                let expected = dense_admittance(&plate, setup.layers.bone_thickness, k, s, load);
-                let found = admittance(setup, &bone, k, Complex::new(s.re, s.im));
-                let error = (c64::new(found.re, found.im) - expected).norm() / expected.norm();
-                // Exponentials up to e⁸ cost the dense side up to seven of its sixteen digits.
-                assert!(
-                    error < 1e-9,
-                    "{setup:?}, seed {seed}, dispersion {dispersion}, index {index}, k {k}: {error:e}"
-                );
-            }
+            let plate = [(setup.layers.bone_thickness, bone)];
+            let what = format!("seed {seed}, dispersion {dispersion}, index {index}");
+            check_admittance(setup, &plate, (&bone).into(), &what);
+            // Two to six sublayers of other draws, the thickest up to nine times as thick as the thinnest.
+            let count = 2 + index % 5;
+            let solids: Vec<Bone> = (0..count)
+                .map(|i| {
+                    let drawn = ensemble.bone(10 + 6 * index + i).unwrap();
+                    Bone { density: drawn.density * (0.8 + 0.1 * i as f64), ..drawn }
+                })
+                .collect();
+            let shares: Vec<f64> = (0..count).map(|i| (1 + (7 * i + index) % 9) as f64).collect();
+            let whole = setup.layers.bone_thickness / shares.iter().sum::<f64>();
+            let thicknesses = shares.iter().map(|share| share * whole);
+            let stack: Vec<(f64, Bone)> = thicknesses.zip(solids).collect();
+            let sublayers: Vec<Sublayer> =
+                stack.iter().map(|&(thickness, solid)| Sublayer { thickness, solid }).collect();
+            let sublayers = Sublayers::new(&sublayers).unwrap();
+            check_admittance(
+                setup,
+                &stack,
+                (&sublayers).into(),
+                &format!("{what}, {count} sublayers"),
+            );
+        }
+    }
+}
+
+/// At a wave of plates with free faces some displacements of the bottom cause no traction on top.
+#[test]
+fn guided_waves_of_sublayers_leave_both_faces_free() {
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.2]);
+    let ensemble = Ensemble::new(&point, 23).unwrap();
+    for (thickness, count) in [(0.6e-3, 2_u32), (0.6e-3, 5), (2e-3, 3)] {
+        let share = thickness / f64::from(count);
+        let solids: Vec<Bone> = (0..count).map(|i| ensemble.bone(i.into()).unwrap()).collect();
+        let sublayers: Vec<_> =
+            solids.iter().map(|&solid| Sublayer { thickness: share, solid }).collect();
+        let found =
+            Solver::new(&Setup::default()).guided_waves(&Sublayers::new(&sublayers).unwrap());
+        let plates = || -> Vec<_> {
+            let factor = c64::new(1.0, 0.0);
+            solids.iter().map(|bone| (share, Plate { bone, factor })).collect()
+        };
+        let omega = TAU * found.frequency;
+        let unit = solids[0].elasticity.rows()[0][0] / thickness;
+        let tractions = |k: f64, omega: f64| {
+            let transfer = transfer_of_all(&plates(), k, c64::new(0.0, omega), unit);
+            let block = Mat::from_fn(3, 3, |i, j| transfer[(i + 3, j)]);
+            let values = block.singular_values().unwrap();
+            values[2] / values[0]
+        };
+        for wave in [found.a0.unwrap(), found.s0.unwrap()] {
+            let k = omega / wave.phase_velocity;
+            let (there, beside) = (tractions(k, omega), tractions(1.001 * k, omega));
+            assert!(
+                there < 1e-6 * beside,
+                "{count} of {thickness} m, {wave:?}: {there:e}, {beside:e}"
+            );
+            // Along the curve of the wave there is none either.
+            let step = 1e-3;
+            let along = tractions(
+                (1.0 + step) * k,
+                omega * (1.0 + step * wave.group_velocity / wave.phase_velocity),
+            );
+            assert!(
+                along < 1e-2 * beside,
+                "{count} of {thickness} m, {wave:?}: {along:e}, {beside:e}"
+            );
         }
     }
 }

@@ -5,7 +5,8 @@
 use std::fs;
 use std::path::PathBuf;
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::{Bone, BoneRef, Sublayer, Sublayers};
+use osteon_common::case::Setup;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Point;
@@ -28,7 +29,7 @@ fn bone(dispersion: f64, seed: u64, index: u64) -> Bone {
     Ensemble::new(&point, seed).unwrap().bone(index).unwrap()
 }
 
-fn hybrid(setup: &Setup, bone: &Bone) -> Result<Arrival, Failure> {
+fn hybrid<'a>(setup: &Setup, bone: impl Into<BoneRef<'a>>) -> Result<Arrival, Failure> {
     Hybrid::new(setup).arrival(bone, &mut HybridWorkspace::default())
 }
 
@@ -75,7 +76,8 @@ fn reference_cases() {
 }
 
 /// The hybrid method and the refined exact one tell the same of a bone.
-fn check_agreement(setup: &Setup, bone: &Bone, relative: f64, what: &str) {
+fn check_agreement<'a>(setup: &Setup, bone: impl Into<BoneRef<'a>>, relative: f64, what: &str) {
+    let bone = bone.into();
     let mut refined = *setup;
     refined.solver.method = Method::Exact;
     refined.solver.refinement = 5.0;
@@ -113,6 +115,22 @@ fn random_draws_agree_with_the_exact_method() {
             let what = format!("{thickness} m, dispersion {dispersion}, draw {index}");
             check_agreement(&setup, &bone(dispersion, 7, index), relative, &what);
         }
+    }
+}
+
+/// Two halves, a thin sublayer between thick ones, and five of one thickness.
+#[test]
+fn sublayers_agree_with_the_exact_method() {
+    let stacks: [&[f64]; 3] = [&[1.5e-3, 2.5e-3], &[2e-3, 0.3e-3, 1.7e-3], &[0.6e-3; 5]];
+    for (seed, thicknesses) in (20..).zip(stacks) {
+        let sublayers: Vec<Sublayer> = thicknesses
+            .iter()
+            .zip(0..)
+            .map(|(&thickness, index)| Sublayer { thickness, solid: bone(0.2, seed, index) })
+            .collect();
+        let sublayers = Sublayers::new(&sublayers).unwrap();
+        let setup = setup(|s| s.layers.bone_thickness = sublayers.thickness());
+        check_agreement(&setup, &sublayers, 1e-4, &format!("{thicknesses:?}"));
     }
 }
 

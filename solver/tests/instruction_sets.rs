@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
+use osteon_common::bone::{Sublayer, Sublayers};
 use osteon_common::case::Setup;
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
@@ -56,6 +57,32 @@ fn and_with_a_tilted_probe_in_both_directions() {
         setup.probe.bidirectional = true;
     };
     check(change, 0.25, 3);
+}
+
+#[test]
+fn and_with_sublayers() {
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.25]);
+    let ensemble = Ensemble::new(&point, 6).unwrap();
+    // One so thin that it needs no doubling, and one so thick that it needs many.
+    let sublayers: Vec<_> = [2e-3, 0.05e-3, 0.6e-3, 1.35e-3]
+        .into_iter()
+        .zip(0..)
+        .map(|(thickness, i)| Sublayer { thickness, solid: ensemble.bone(i).unwrap() })
+        .collect();
+    let sublayers = Sublayers::new(&sublayers).unwrap();
+    for refinement in [1.0, 1.5] {
+        let mut setup = Setup::default();
+        setup.layers.bone_thickness = sublayers.thickness();
+        setup.solver.refinement = refinement;
+        let arrival =
+            |isa| Solver::with_isa(&setup, isa).arrival(&sublayers, &mut Workspace::default());
+        let waves = |isa| Solver::with_isa(&setup, isa).guided_waves(&sublayers);
+        let expected = (arrival(Isa::fastest()), waves(Isa::fastest()));
+        assert!(expected.0.is_ok(), "{expected:?}");
+        for isa in Isa::available() {
+            assert_eq!((arrival(isa), waves(isa)), expected, "{}", isa.name());
+        }
+    }
 }
 
 #[test]

@@ -295,7 +295,7 @@ fn the_mirrored_bone_sends_the_same_wave() {
             }
         }
         let mirrored = Bone { elasticity: Elasticity::new(rows).unwrap(), ..bone };
-        // Above refinement 1 the series of a sublayer is summed to rounding.
+        // Above refinement 1 the series of a slice is summed to rounding.
         let mut setup = Setup::default();
         setup.solver.refinement = 1.5;
         let difference = largest_delay(&arrival(&setup, &bone), &arrival(&setup, &mirrored));

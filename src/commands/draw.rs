@@ -33,7 +33,7 @@ pub(super) fn draw(arguments: &DrawArguments) -> Ended {
         )))
     })?;
     let setup = ensemble.setup(index, &specification.setup);
-    let text = case_file::to_toml(&Case { setup, bone });
+    let text = case_file::to_toml(&Case { setup, bone: bone.into() });
     output::stdout(OutputFormat::Text).verbatim(&text).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }

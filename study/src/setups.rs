@@ -250,7 +250,8 @@ impl MeasuredSetup {
 /// # Errors
 /// If its mean model or dispersion has no ensemble.
 pub fn case(seed: u64, index: u64) -> Result<Option<Case>, PointError> {
-    Ok(draw_case(seed, index, &RANGES)?.map(|Drawn { setup, bone, .. }| Case { setup, bone }))
+    let case = |Drawn { setup, bone, .. }| Case { setup, bone: bone.into() };
+    Ok(draw_case(seed, index, &RANGES)?.map(case))
 }
 
 /// Returns the first case of `index` that passes validation and is within the limit of time.

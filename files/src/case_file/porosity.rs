@@ -9,25 +9,21 @@ use osteon_common::porosity::{POROSITY, PorosityModel};
 use crate::materials::{self, Material};
 use crate::reader::{self, Reader, Table};
 
+/// Path of the model in a case file.
+const MODEL_PATH: &str = "bone.porosity_model";
+
 /// Reads the model in `table`. If it is wrong, this is recorded, and the model has no meaning.
 pub(super) fn model(reader: &mut Reader, table: &Table<'_>) -> PorosityModel {
     let mut model = PorosityModel::default();
     let read = reader::section(reader, table, PorosityModel::KEY.name, &mut model);
     if read.is_table() {
-        let path = table.path(PorosityModel::KEY.name);
-        check::porosity_model(&path, &model, &mut reader.violations);
+        check::porosity_model(MODEL_PATH, &model, &mut reader.violations);
     }
     model
 }
 
-/// Returns the bone of the porosity in `table`, or `None` after recording the violations. The path of the
-/// model is `model_path`.
-pub(super) fn bone(
-    reader: &mut Reader,
-    table: &Table<'_>,
-    model: &PorosityModel,
-    model_path: &str,
-) -> Option<Bone> {
+/// Returns the bone of the porosity in `table`, or `None` after recording the violations.
+pub(super) fn bone(reader: &mut Reader, table: &Table<'_>, model: &PorosityModel) -> Option<Bone> {
     let path = table.path(POROSITY.name);
     let replaced = [materials::KEY, "mandel"].into_iter().chain(Material::HAS.map(Parameter::name));
     let beside: Vec<_> = replaced.filter(|key| table.has(key)).collect();
@@ -35,14 +31,14 @@ pub(super) fn bone(
         let beside = beside.join(", ");
         let message = format!(
             "is given together with {beside}; density and elasticity follow from it: give one or the \
-             other (those of the bone between the pores belong to {model_path}.matrix)"
+             other (those of the bone between the pores belong to {MODEL_PATH}.matrix)"
         );
         reader.violations.add(&path, message);
     }
     let porosity = reader.number(table, POROSITY.name)?;
     check::porosity(&path, porosity, &mut reader.violations);
     let known_wrong = |path: &str| reader.violations.has_at_or_below(path);
-    if known_wrong(&path) || known_wrong(model_path) {
+    if known_wrong(&path) || known_wrong(MODEL_PATH) {
         return None;
     }
     match model.bone(porosity) {

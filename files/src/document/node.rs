@@ -105,6 +105,15 @@ impl Node {
         }
     }
 
+    /// Returns whether there is a field with this path, which has the form that [`Node::line_of`] takes.
+    pub(crate) fn holds(&self, path: &str) -> bool {
+        let (mut node, mut rest) = (self, path);
+        while let Some((child, after_child)) = node.next_on_path(rest) {
+            (node, rest) = (child, after_child);
+        }
+        rest.is_empty()
+    }
+
     /// Returns the line of the field with this path. If the field is absent, returns the line of the
     /// innermost existing table on the path; `None` if that table has no header line of its own.
     ///

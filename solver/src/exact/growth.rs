@@ -1,6 +1,6 @@
 //! Growth or phase of waves across the plate: the largest |λ| of the system's eigenvalues.
 //!
-//! It determines how thin a sublayer must be for its Taylor series. For imaginary s the system is,
+//! It determines how thin a slice must be for its Taylor series. For imaginary s the system is,
 //! except for a similarity and a factor -i, the real matrix
 //!
 //! ```text

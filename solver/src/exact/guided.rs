@@ -13,21 +13,23 @@
 //! Within a family none cross but by accident, so that a wave followed from low frequencies keeps its
 //! place in the order.
 
+mod count;
+mod family;
+mod stack;
+
 use std::f64::consts::TAU;
 
-use osteon_common::case::Bone;
+use osteon_common::bone::BoneRef;
 
-use crate::complex::Complex;
-use crate::exact::plate::{AccuratePlate, Layer, Symmetric};
-use crate::exact::tensor::{FillPlate, Solid};
-use crate::isa::{Isa, Kernel};
-use crate::lanes::Lanes;
+use self::count::CountWaves;
+use self::family::{EXTENSIONAL, FLEXURAL, Family, Symmetry};
+use self::stack::FreeStack;
+use crate::exact::plate::{AccuratePlate, Fill};
+use crate::isa::Isa;
+use crate::media::{Media, MediumLayer};
 use crate::medium::Medium;
 use crate::solver::Solver;
-use crate::vector::{ComplexVector, Vector};
 
-/// Entries of the elasticity matrix below this part of the largest are zero but for rounding.
-const ROUNDING: f64 = 1e-12;
 /// Ratio of neighbouring wavenumbers of the search.
 const SEARCH_STEP: f64 = 1.02;
 /// Maximum number of steps of the search: wavenumbers of 10⁸ times the least one.
@@ -79,118 +81,56 @@ impl Solver {
     /// Computes the fundamental guided waves of a bone at the probe's centre frequency: those of a plate
     /// of the bone's thickness with free faces, without attenuation. Neither the fluids nor the solver's
     /// method and refinement matter.
-    pub fn guided_waves(&self, bone: &Bone) -> GuidedWaves {
-        let (isa, layers) = (self.isa(), &self.setup().layers);
-        let medium = isa.run(Solid(bone));
-        let mut plate = AccuratePlate::default();
-        let thickness = layers.bone_thickness;
-        isa.run(FillPlate { medium: &medium, thickness, plate: &mut plate });
-        let frequency = self.setup().probe.center_frequency;
-        let symmetry = Symmetry::new(bone);
-        let mut free_plate = FreePlate { isa, medium: &medium, plate, thickness };
+    pub fn guided_waves<'a>(&self, bone: impl Into<BoneRef<'a>>) -> GuidedWaves {
+        self.guided_waves_of(bone.into())
+    }
+
+    fn guided_waves_of(&self, bone: BoneRef<'_>) -> GuidedWaves {
+        let (isa, frequency) = (self.isa(), self.setup().probe.center_frequency);
+        let thickness = self.setup().layers.bone_thickness;
+        let media = Media::new(isa, bone, thickness);
+        let symmetry = Symmetry::new(&bone.sublayers(thickness));
         let flexural = Family::new(symmetry, FLEXURAL);
         let extensional = Family::new(symmetry, EXTENSIONAL);
-        let rank = extensional.rank_of_extensional(&medium);
+        let rank = extensional.rank_of_extensional(&media);
+        let mut free_bone = FreeBone::new(isa, &media, symmetry);
         GuidedWaves {
             frequency,
-            a0: free_plate.wave(&flexural, 1, TAU * frequency, THINNEST_FLEXURAL),
-            s0: free_plate.wave(&extensional, rank, TAU * frequency, THINNEST_EXTENSIONAL),
+            a0: free_bone.wave(&flexural, 1, TAU * frequency, THINNEST_FLEXURAL),
+            s0: free_bone.wave(&extensional, rank, TAU * frequency, THINNEST_EXTENSIONAL),
         }
     }
 }
 
-/// Number of displacements at the faces: p1, p2, p3 (even in x3), q1, q2, q3 (odd).
-const FACES: usize = 6;
-/// p1, the displacement of S0 at low frequencies.
-const EXTENSIONAL: usize = 0;
-/// p2, that of the wave of horizontal shear.
-const SHEAR: usize = 1;
-/// p3, that of A0.
-const FLEXURAL: usize = 2;
-
-/// The planes in which a solid is its own mirror image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Symmetry {
-    /// The plane of propagation, across x2.
-    propagation: bool,
-    /// The plane of the plate, across x3.
-    plate: bool,
-    /// The plane across x1: with the image in a point, half a turn about x1.
-    cross: bool,
-}
-
-impl Symmetry {
-    fn new(bone: &Bone) -> Self {
-        let rows = bone.elasticity.rows();
-        let largest = rows.iter().flatten().fold(0.0, |max: f64, entry| max.max(entry.abs()));
-        // 22 has no influence where nothing varies along x2; the others by their index pairs.
-        let is_zero = |pairs: &[(usize, usize)]| {
-            pairs.iter().all(|&(i, j)| rows[i][j].abs() <= ROUNDING * largest)
-        };
-        Self {
-            propagation: is_zero(&[(0, 3), (0, 5), (2, 3), (2, 5), (3, 4), (4, 5)]),
-            plate: is_zero(&[(0, 3), (0, 4), (2, 3), (2, 4), (3, 5), (4, 5)]),
-            cross: is_zero(&[(0, 4), (0, 5), (2, 4), (2, 5), (3, 4), (3, 5)]),
-        }
-    }
-}
-
-/// Waves that do not cross each other: those of one behaviour under every symmetry of the solid.
-#[derive(Debug, Clone, PartialEq)]
-struct Family {
-    /// The displacements at the faces.
-    faces: Vec<usize>,
-    /// The components of the displacement.
-    components: Vec<usize>,
-    /// Those that are not zero in the middle plane.
-    middle: Vec<usize>,
-    /// How many waves of the family belong to one of a clamped half of the plate.
-    copies: u64,
-}
-
-impl Family {
-    /// Returns the family of waves that contain the displacement `of` of the faces.
-    fn new(symmetry: Symmetry, of: usize) -> Self {
-        let across_x2 = |face: usize| face % 3 == 1;
-        let across_x3 = |face: usize| (face % 3 == 2) != (face >= 3);
-        let belongs = |&face: &usize| {
-            let (changes2, changes3) =
-                (across_x2(face) != across_x2(of), across_x3(face) != across_x3(of));
-            !(symmetry.propagation && changes2
-                || symmetry.plate && changes3
-                || symmetry.cross && changes2 != changes3)
-        };
-        let faces: Vec<usize> = (0..FACES).filter(belongs).collect();
-        let has = |component: &usize| faces.iter().any(|face| face % 3 == *component);
-        Self {
-            components: (0..3).filter(has).collect(),
-            middle: faces.iter().copied().filter(|face| *face < 3).collect(),
-            copies: if symmetry.plate || symmetry.cross { 1 } else { 2 },
-            faces,
-        }
-    }
-
-    /// Returns the place of S0, from 1, in the order of ω at low wavenumbers.
-    fn rank_of_extensional(&self, medium: &Medium) -> u64 {
-        let flexural = self.faces.contains(&FLEXURAL);
-        // Of the two waves in the plane of the plate the faster one has more of the component whose
-        // stiffness is larger.
-        let slower_shear = medium.membrane[1][1] < medium.membrane[0][0];
-        let shear = self.faces.contains(&SHEAR) && slower_shear;
-        1 + u64::from(flexural) + u64::from(shear)
-    }
-}
-
-/// A plate with free faces.
-struct FreePlate<'a> {
-    isa: Isa,
-    medium: &'a Medium,
-    plate: AccuratePlate,
+/// A bone with free faces.
+struct FreeBone {
+    counter: WaveCounter,
+    /// Bound of the speed of a wave without cut-off frequency, and of every group velocity, m/s.
+    fastest: f64,
     /// Thickness, m.
     thickness: f64,
 }
 
-impl FreePlate<'_> {
+/// What counts the waves of a bone.
+enum WaveCounter {
+    Plate { isa: Isa, medium: Medium, plate: Box<AccuratePlate> },
+    Stack(FreeStack),
+}
+
+impl FreeBone {
+    fn new(isa: Isa, media: &Media, symmetry: Symmetry) -> Self {
+        let counter = if media.lower.is_empty() {
+            let MediumLayer { medium, thickness } = media.uppermost.clone();
+            let mut plate = Box::<AccuratePlate>::default();
+            isa.run(Fill { medium: &medium, thickness, doublings_min: 1, plate: &mut plate });
+            WaveCounter::Plate { isa, medium, plate }
+        } else {
+            WaveCounter::Stack(FreeStack::new(isa, media, symmetry.halves()))
+        };
+        let thickness = media.iter().fold(0.0, |sum, layer| sum + layer.thickness);
+        Self { counter, fastest: media.fastest(), thickness }
+    }
+
     /// Returns the wave of this rank in a family at `omega`, rad/s: the first wavenumber at which its
     /// frequency, which rises from zero, is `omega`. `None` if its product with the thickness is below
     /// `thinnest`.
@@ -203,7 +143,7 @@ impl FreePlate<'_> {
     ) -> Option<GuidedWave> {
         // No wave that has no cut-off frequency is faster: the displacement that is the same at all
         // depths bounds its frequency from above.
-        let mut low = BELOW_LEAST * omega / self.medium.fastest;
+        let mut low = BELOW_LEAST * omega / self.fastest;
         let mut high = low;
         for step in 0.. {
             if step == SEARCH_STEPS_MAX {
@@ -220,7 +160,7 @@ impl FreePlate<'_> {
             return None;
         }
         let step = GROUP_STEP * k;
-        let reach = 2.0 * self.medium.fastest * step;
+        let reach = 2.0 * self.fastest * step;
         let mut at = |k: f64| {
             let range = (omega - reach, omega + reach);
             bisect(range, |omega| Some(self.count(family, k, omega)? >= rank))
@@ -232,8 +172,12 @@ impl FreePlate<'_> {
     /// Returns the number of waves of a family whose frequency at `k` (rad/m) is below `omega` (rad/s);
     /// `None` if a number is not finite.
     fn count(&mut self, family: &Family, k: f64, omega: f64) -> Option<u64> {
-        let Self { isa, medium, plate, .. } = self;
-        let mut at = |k: f64| isa.run(CountWaves { medium, plate, family, k, omega });
+        let mut at = |k: f64| match &mut self.counter {
+            WaveCounter::Plate { isa, medium, plate } => {
+                isa.run(CountWaves { medium, plate, family, k, omega })
+            }
+            WaveCounter::Stack(stack) => stack.count(family, k, omega),
+        };
         at(k).or_else(|| at(BESIDE * k))
     }
 }
@@ -252,159 +196,4 @@ fn bisect(
         }
     }
     Some(0.5 * (low + high))
-}
-
-/// Kernel that counts the waves below a frequency.
-struct CountWaves<'a> {
-    medium: &'a Medium,
-    plate: &'a mut AccuratePlate,
-    family: &'a Family,
-    /// Wavenumber, rad/m.
-    k: f64,
-    /// Frequency, rad/s.
-    omega: f64,
-}
-
-impl Kernel for CountWaves<'_> {
-    type Output = Option<u64>;
-
-    #[inline(always)]
-    fn run<V: Vector>(self) -> Option<u64> {
-        let Self { medium, plate, family, k, omega } = self;
-        plate.prepare::<V>(medium, Complex::new(0.0, omega), (k, k));
-        let (mut layer, doublings) = plate.thinnest(V::splat(k))?;
-        // A sublayer is so thin that it has no wave between clamped faces.
-        let mut clamped = 0_u64;
-        for _ in 1..doublings {
-            let joint = negative_pivots(joint_matrix(&layer.joint()), &family.components)?;
-            clamped = clamped.checked_mul(2)?.checked_add(joint)?;
-            layer = layer.double();
-        }
-        let middle = negative_pivots(joint_matrix(&layer.joint()), &family.middle)?;
-        clamped = clamped.checked_mul(family.copies)?.checked_add(middle)?;
-        let faces = negative_pivots(face_matrix(&layer.double()), &family.faces)?;
-        clamped.checked_add(faces)
-    }
-}
-
-/// A real symmetric matrix, or its upper left part.
-type Real = [[f64; FACES]; FACES];
-
-/// Returns the first lane of a number.
-#[inline(always)]
-fn first_lane<V: Vector>(value: ComplexVector<V>) -> Complex {
-    let (mut re, mut im) = (Lanes::ZERO, Lanes::ZERO);
-    value.re.store(&mut re, 0);
-    value.im.store(&mut im, 0);
-    Complex::new(re.0[0], im.0[0])
-}
-
-/// Returns the stiffness of a joint, which is real without damping.
-#[inline(always)]
-fn joint_matrix<V: Vector>(joint: &Symmetric<V>) -> Real {
-    let mut matrix = [[0.0; FACES]; FACES];
-    for i in 0..3 {
-        for j in 0..3 {
-            matrix[i][j] = first_lane(joint[symmetric_entry(i, j)]).re;
-        }
-    }
-    matrix
-}
-
-/// Returns the stiffness of both faces of a layer in the displacements p and q: with u = p + i q on top
-/// and p - i q at the bottom,
-///
-/// ```text
-/// [ Re A - Re D, -Im A - Im D; its transpose, Re A + Re D ]
-/// ```
-#[inline(always)]
-fn face_matrix<V: Vector>(layer: &Layer<V>) -> Real {
-    let mut matrix = [[0.0; FACES]; FACES];
-    for i in 0..3 {
-        for j in 0..3 {
-            let top = first_lane(layer.top[3 * i + j]);
-            let down = first_lane(layer.down[symmetric_entry(i, j)]);
-            matrix[i][j] = top.re - down.re;
-            matrix[i + 3][j + 3] = top.re + down.re;
-            matrix[i][j + 3] = -(top.im + down.im);
-            matrix[j + 3][i] = matrix[i][j + 3];
-        }
-    }
-    matrix
-}
-
-/// Returns where entry (i, j) of a symmetric 3×3 matrix is stored.
-#[inline(always)]
-fn symmetric_entry(i: usize, j: usize) -> usize {
-    let (low, high) = if i < j { (i, j) } else { (j, i) };
-    low * (5 - low) / 2 + high
-}
-
-/// Returns the number of negative eigenvalues of the part of a matrix with these rows and columns: that
-/// of the negative pivots. `None` if a pivot is zero or not finite.
-#[inline(always)]
-fn negative_pivots(mut matrix: Real, rows: &[usize]) -> Option<u64> {
-    let (mut left, mut count) = ([0; FACES], rows.len());
-    left[..count].copy_from_slice(rows);
-    let mut negative = 0;
-    while count > 0 {
-        // The largest pivot first.
-        let mut place = 0;
-        for other in 1..count {
-            let size = |place: usize| matrix[left[place]][left[place]].abs();
-            if size(other) > size(place) {
-                place = other;
-            }
-        }
-        count -= 1;
-        left.swap(place, count);
-        let row = left[count];
-        let pivot = matrix[row][row];
-        if pivot == 0.0 || !pivot.is_finite() {
-            return None;
-        }
-        negative += u64::from(pivot < 0.0);
-        for &i in &left[..count] {
-            let factor = matrix[i][row] / pivot;
-            for &j in &left[..count] {
-                matrix[i][j] = (-factor).mul_add(matrix[row][j], matrix[i][j]);
-            }
-        }
-    }
-    Some(negative)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const ALL: Symmetry = Symmetry { propagation: true, plate: true, cross: true };
-    const NONE: Symmetry = Symmetry { propagation: false, plate: false, cross: false };
-
-    #[test]
-    fn families_are_those_of_the_symmetries() {
-        let faces = |symmetry, of| Family::new(symmetry, of).faces;
-        assert_eq!(faces(ALL, EXTENSIONAL), [0, 5]);
-        assert_eq!(faces(ALL, FLEXURAL), [2, 3]);
-        assert_eq!(faces(NONE, FLEXURAL), [0, 1, 2, 3, 4, 5]);
-        assert_eq!(faces(Symmetry { plate: true, ..NONE }, EXTENSIONAL), [0, 1, 5]);
-        assert_eq!(faces(Symmetry { plate: true, ..NONE }, FLEXURAL), [2, 3, 4]);
-        assert_eq!(faces(Symmetry { propagation: true, ..NONE }, FLEXURAL), [0, 2, 3, 5]);
-        assert_eq!(faces(Symmetry { cross: true, ..NONE }, EXTENSIONAL), [0, 4, 5]);
-        assert_eq!(faces(Symmetry { cross: true, ..NONE }, FLEXURAL), [1, 2, 3]);
-        let family = Family::new(ALL, EXTENSIONAL);
-        assert_eq!((family.components, family.middle, family.copies), (vec![0, 2], vec![0], 1));
-    }
-
-    #[test]
-    fn pivots_have_the_signs_of_the_eigenvalues() {
-        let mut matrix = [[0.0; FACES]; FACES];
-        // Eigenvalues 3 and -1, and a row that is left out.
-        (matrix[0][0], matrix[0][4], matrix[4][0], matrix[4][4]) = (1.0, 2.0, 2.0, 1.0);
-        matrix[2][2] = -5.0;
-        assert_eq!(negative_pivots(matrix, &[0, 4]), Some(1));
-        assert_eq!(negative_pivots(matrix, &[0, 2, 4]), Some(2));
-        assert_eq!(negative_pivots(matrix, &[1]), None);
-        assert_eq!(symmetric_entry(2, 1), 4);
-    }
 }

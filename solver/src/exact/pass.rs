@@ -6,7 +6,7 @@ use osteon_common::sampling;
 
 use crate::exact::bin_tables::{Band, BinTables};
 use crate::exact::estimated::{Estimated, limit_to_one, root_sum_square};
-use crate::exact::plate::{AccuratePlate, FastPlate};
+use crate::exact::plate_stack::PlateStack;
 use crate::exact::prepared_setup::PreparedSetup;
 use crate::exact::response::Spectra;
 use crate::exact::signal::{Signal, Slopes};
@@ -39,9 +39,10 @@ const NOISE_GROWTH: f64 = 0.9;
 /// Scratch memory of one thread; its contents never reach a result.
 #[derive(Debug, Default)]
 pub(crate) struct ExactWorkspace {
-    pub(crate) fast: FastPlate,
-    /// The plate of thorough passes.
-    pub(crate) accurate: AccuratePlate,
+    /// The plates of quick and plain passes.
+    pub(crate) fast: PlateStack<8>,
+    /// The plates of thorough passes.
+    pub(crate) accurate: PlateStack<11>,
     pub(crate) spectra: Spectra,
     windows: Vec<Window>,
     slopes: Slopes,

@@ -10,13 +10,13 @@ use crate::exact::blending;
 use crate::exact::estimated::Estimated;
 use crate::exact::grade_caches::GradeCaches;
 use crate::exact::pass::{self, ExactWorkspace};
-use crate::exact::plate::Plate;
+use crate::exact::plate_stack::PlateStack;
 use crate::exact::prepared_setup::PreparedSetup;
 use crate::exact::response::Spectra;
 use crate::exact::table_cache::TableCache;
 use crate::exact::weights::{self, LARGE_ERROR, VERY_LARGE_ERROR, rise};
 use crate::failure::Failure;
-use crate::medium::Medium;
+use crate::media::Media;
 
 /// Number of thorough passes that find no arrival before the bone is said to have none. (A single quick
 /// or plain one leads to the thorough grade.)
@@ -26,7 +26,7 @@ const THOROUGH_ATTEMPTS: usize = 2;
 pub(super) struct BonePasses<'a> {
     prepared: &'a PreparedSetup,
     pub(super) caches: &'a GradeCaches,
-    medium: &'a Medium,
+    media: &'a Media,
     /// Upper bound of every wave's speed, m/s.
     speed: f64,
     /// Index of the speed bin.
@@ -44,12 +44,12 @@ impl<'a> BonePasses<'a> {
     pub(super) fn new(
         prepared: &'a PreparedSetup,
         caches: &'a GradeCaches,
-        medium: &'a Medium,
+        media: &'a Media,
         speed: f64,
         bin: usize,
         workspace: &'a mut ExactWorkspace,
     ) -> Self {
-        Self { prepared, caches, medium, speed, bin, workspace, count: 0, pairs: 0 }
+        Self { prepared, caches, media, speed, bin, workspace, count: 0, pairs: 0 }
     }
 
     /// Makes as many passes as the bone needs in its speed bin. Near the edge of the bin, does the same
@@ -164,7 +164,7 @@ impl<'a> BonePasses<'a> {
         weight: impl Fn(&Estimated, usize) -> f64,
     ) -> Result<Estimated, Failure> {
         let bin = &*cache.tables(self.bin, self.speed)?;
-        self.prepared.fill_plate(self.medium, &mut self.workspace.fast);
+        self.workspace.fast.fill(self.prepared.isa, self.media);
         self.make_passes(bin, 1, weight, |workspace| (&mut workspace.fast, &mut workspace.spectra))
     }
 
@@ -177,7 +177,7 @@ impl<'a> BonePasses<'a> {
     ) -> Result<Estimated, Failure> {
         let prepared = self.prepared;
         let bin = &*cache.tables(self.bin, self.speed)?;
-        prepared.fill_plate(self.medium, &mut self.workspace.accurate);
+        self.workspace.accurate.fill(prepared.isa, self.media);
         let weight = |found: &Estimated, _| {
             let needs_next_grade =
                 weights::comparable_error(prepared, found.sampling_error) >= limit;
@@ -196,20 +196,20 @@ impl<'a> BonePasses<'a> {
     ///
     /// `weight` is that of the next wider band, given the last result and the number of wider bands so
     /// far; no pass follows if it is 0, or once `attempts` passes have found no arrival. `parts` returns
-    /// the plate and the spectra of a workspace that are used.
+    /// the plates and the spectra of a workspace that are used.
     fn make_passes<const TERMS: usize>(
         &mut self,
         bin: &BinTables,
         attempts: usize,
         weight: impl Fn(&Estimated, usize) -> f64,
-        parts: fn(&mut ExactWorkspace) -> (&mut Plate<TERMS>, &mut Spectra),
+        parts: fn(&mut ExactWorkspace) -> (&mut PlateStack<TERMS>, &mut Spectra),
     ) -> Result<Estimated, Failure> {
         let prepared = self.prepared;
         self.workspace.spectra.clear(&bin.tables);
         let fill = |passes: &mut Self, lines: Range<usize>| {
-            let (plate, spectra) = parts(passes.workspace);
+            let (plates, spectra) = parts(passes.workspace);
             passes.pairs += bin.tables.pairs(lines.clone());
-            spectra.fill(prepared.isa, &bin.tables, passes.medium, plate, lines);
+            spectra.fill(prepared.isa, &bin.tables, passes.media, plates, lines);
         };
         fill(self, 0..bin.first.lines);
         let mut last = self.make_pass(bin, &bin.first);

@@ -1,14 +1,13 @@
 //! A setup with what every pass of the exact method needs of it.
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::BoneRef;
+use osteon_common::case::Setup;
 use osteon_common::probe::Place;
 use osteon_common::sampling;
 
-use crate::exact::plate::Plate;
-use crate::exact::tensor::{FillPlate, Solid};
 use crate::failure::{Failure, check_direct_wave, speed_not_finite};
 use crate::isa::Isa;
-use crate::medium::Medium;
+use crate::media::Media;
 
 /// A setup, the places of its receivers, and the instruction set on which it is computed.
 #[derive(Debug, Clone)]
@@ -30,20 +29,14 @@ impl PreparedSetup {
         }
     }
 
-    /// Returns the solid of a bone, and the upper bound of every wave's speed, m/s.
-    pub(super) fn solid(&self, bone: &Bone) -> Result<(Medium, f64), Failure> {
-        let medium = self.isa.run(Solid(bone));
-        let speed = sampling::fastest(&self.setup, medium.fastest);
+    /// Returns the media of a bone, and the upper bound of every wave's speed, m/s.
+    pub(super) fn media(&self, bone: BoneRef<'_>) -> Result<(Media, f64), Failure> {
+        let media = Media::new(self.isa, bone, self.setup.layers.bone_thickness);
+        let speed = sampling::fastest(&self.setup, media.fastest());
         if !speed.is_finite() {
             return Err(speed_not_finite());
         }
         check_direct_wave(&self.setup, speed)?;
-        Ok((medium, speed))
-    }
-
-    /// Fills `plate` for `medium`.
-    pub(super) fn fill_plate<const TERMS: usize>(&self, medium: &Medium, plate: &mut Plate<TERMS>) {
-        let thickness = self.setup.layers.bone_thickness;
-        self.isa.run(FillPlate { medium, thickness, plate });
+        Ok((media, speed))
     }
 }

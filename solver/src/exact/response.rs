@@ -3,12 +3,14 @@
 use std::ops::Range;
 
 use crate::complex::Complex;
+use crate::exact::layer::Foundation;
 use crate::exact::plate::Plate;
+use crate::exact::plate_stack::PlateStack;
 use crate::exact::tables::{Block, Line, Tables};
 use crate::exact::tilted::SumTilted;
 use crate::isa::{Isa, Kernel};
 use crate::lanes::{ComplexLanes, LANES, Lanes};
-use crate::medium::Medium;
+use crate::media::Media;
 use crate::vector::{ComplexVector, Vector};
 
 /// Number of receivers that are summed side by side.
@@ -37,14 +39,14 @@ impl Spectra {
         self.rows.iter().all(|l| l.re.0.iter().chain(&l.im.0).all(|value| value.is_finite()))
     }
 
-    /// Makes room for the spectra of one plate, and sets them to zero.
+    /// Makes room for the spectra of one bone, and sets them to zero.
     pub(crate) fn clear(&mut self, tables: &Tables) {
         self.runs = tables.runs.len();
         self.rows.clear();
         self.rows.resize(tables.receivers() * self.runs, ComplexLanes::ZERO);
     }
 
-    /// Computes some lines of the spectra of one plate.
+    /// Computes some lines of the spectra of one bone.
     ///
     /// Its parts are separate kernels: in one large function the compiler would have too few
     /// registers for the innermost one.
@@ -52,13 +54,13 @@ impl Spectra {
         &mut self,
         isa: Isa,
         tables: &Tables,
-        medium: &Medium,
-        plate: &mut Plate<TERMS>,
+        media: &Media,
+        plates: &mut PlateStack<TERMS>,
         lines: Range<usize>,
     ) {
         let mut responses = std::mem::take(&mut self.responses);
         for i in lines {
-            respond(isa, tables, medium, plate, &tables.lines[i], &mut responses);
+            respond(isa, tables, media, plates, &tables.lines[i], &mut responses);
             self.sum(isa, tables, i, &responses);
         }
         self.responses = responses;
@@ -82,8 +84,8 @@ impl Spectra {
 pub(crate) fn respond<const TERMS: usize>(
     isa: Isa,
     tables: &Tables,
-    medium: &Medium,
-    plate: &mut Plate<TERMS>,
+    media: &Media,
+    plates: &mut PlateStack<TERMS>,
     line: &Line,
     responses: &mut Vec<ComplexLanes>,
 ) {
@@ -92,35 +94,29 @@ pub(crate) fn respond<const TERMS: usize>(
     let mut scratch = None;
     for b in 0..line.blocks {
         let k = tables.wavenumbers(b);
-        isa.run(Prepare { plate, medium, s: line.lossless.bone, k: (k.0[0], k.0[LANES - 1]) });
+        plates.prepare(isa, media, line.lossless.bone, k);
         let (block, echo) = tables.block(line, kept, b, &mut scratch);
-        let Line { inertia, .. } = *line;
-        let mirror = tables.mirror;
-        responses.push(isa.run(Respond { plate, k, block, echo, inertia, mirror }));
-    }
-}
-
-/// Kernel that prepares a plate for one block of wavenumbers.
-struct Prepare<'a, const TERMS: usize> {
-    plate: &'a mut Plate<TERMS>,
-    medium: &'a Medium,
-    s: Complex,
-    k: (f64, f64),
-}
-
-impl<const TERMS: usize> Kernel for Prepare<'_, TERMS> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<V: Vector>(self) {
-        self.plate.prepare::<V>(self.medium, self.s, self.k);
+        let (inertia, mirror, plate) = (line.inertia, tables.mirror, &plates.uppermost);
+        responses.push(match plates.foundation(isa, media, k, &block.load) {
+            None => {
+                let foundation = &block.load;
+                isa.run(Respond { plate, k, foundation, block, echo, inertia, mirror })
+            }
+            Some(foundation) => {
+                let foundation = &foundation;
+                isa.run(Respond { plate, k, foundation, block, echo, inertia, mirror })
+            }
+        });
     }
 }
 
 /// Kernel that computes the weights of the cosines of one block of wavenumbers.
-struct Respond<'a, const TERMS: usize> {
+struct Respond<'a, F, const TERMS: usize> {
+    /// The uppermost plate.
     plate: &'a Plate<TERMS>,
     k: &'a Lanes,
+    /// What it lies on.
+    foundation: &'a F,
     block: &'a Block,
     echo: &'a ComplexLanes,
     inertia: Complex,
@@ -128,17 +124,16 @@ struct Respond<'a, const TERMS: usize> {
     mirror: f64,
 }
 
-impl<const TERMS: usize> Kernel for Respond<'_, TERMS> {
+impl<F: Foundation, const TERMS: usize> Kernel for Respond<'_, F, TERMS> {
     type Output = ComplexLanes;
 
     #[inline(always)]
     fn run<V: Vector>(self) -> ComplexLanes {
-        let Self { plate, k, block, echo, inertia, mirror } = self;
+        let Self { plate, k, foundation, block, echo, inertia, mirror } = self;
         let inertia = ComplexVector { re: V::splat(inertia.re), im: V::splat(inertia.im) };
         let mut response = ComplexLanes::ZERO;
         for part in 0..V::PARTS {
-            let load = ComplexVector::load(&block.load, part);
-            let impedance = plate.impedance::<V>(V::load(k, part), load);
+            let impedance = plate.impedance::<V, F>(k, foundation, part);
             // R = (g d - q)/(g d + q), q = ρ1 s², d = -1/Y; half of (R + 1)/(1 + R E2) with one division,
             // and less one half with the mirror wave. Where the bone attenuates, both d and q are
             // divided by m(s).

@@ -1,4 +1,4 @@
-//! The transfer matrix of a thin sublayer by its Taylor series.
+//! The transfer matrix of a thin slice of a plate by its Taylor series.
 //!
 //! exp(M d) of the system in [`crate::medium`] is, entry by entry, a polynomial in κ d and
 //! σ d²/stiffness with real coefficients that depend on the solid alone. They are computed once

@@ -7,7 +7,8 @@
 
 use std::sync::Arc;
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::BoneRef;
+use osteon_common::case::Setup;
 use osteon_common::sampling::{self, Grade, OuterFaces, SPEED_BINS};
 
 use crate::arrival::Arrival;
@@ -21,7 +22,7 @@ use crate::exact::table_memory::TableMemory;
 use crate::failure::Failure;
 use crate::isa::Isa;
 use crate::lanes::ComplexLanes;
-use crate::medium::Medium;
+use crate::media::Media;
 
 /// The exact method for one setup.
 #[derive(Debug)]
@@ -44,7 +45,7 @@ pub struct Filled<'a> {
     prepared: &'a PreparedSetup,
     bin: TablesRef<'a>,
     accurate: bool,
-    medium: Medium,
+    media: Media,
     speed: f64,
     memory: &'a mut StageWorkspace,
 }
@@ -76,21 +77,21 @@ impl Stages {
     /// If no wave through the bone can arrive first, or if it is out of scale.
     pub fn tensor<'a>(
         &'a self,
-        bone: &Bone,
+        bone: impl Into<BoneRef<'a>>,
         memory: &'a mut StageWorkspace,
     ) -> Result<Filled<'a>, Failure> {
         let Self { prepared, caches } = self;
         let accurate = sampling::first_grade(&prepared.setup) == Grade::Thorough;
-        let (medium, speed) = prepared.solid(bone)?;
+        let (media, speed) = prepared.media(bone.into())?;
         if accurate {
-            prepared.fill_plate(&medium, &mut memory.exact.accurate);
+            memory.exact.accurate.fill(prepared.isa, &media);
         } else {
-            prepared.fill_plate(&medium, &mut memory.exact.fast);
+            memory.exact.fast.fill(prepared.isa, &media);
         }
         let cache = if accurate { &caches.thorough } else { &caches.quick };
         let index = sampling::speed_bin(&prepared.setup, speed).unwrap_or(SPEED_BINS);
         let bin = cache.tables(index, speed)?;
-        Ok(Filled { prepared, bin, accurate, medium, speed, memory })
+        Ok(Filled { prepared, bin, accurate, media, speed, memory })
     }
 }
 
@@ -106,16 +107,16 @@ impl<'b> Filled<'b> {
 
     /// Admittance: computes the plate's response at every pair.
     pub fn admittance<'a>(&'a mut self) -> Responded<'a, 'b> {
-        let (isa, tables, medium) = (self.prepared.isa, &self.bin.tables, &self.medium);
+        let (isa, tables, media) = (self.prepared.isa, &self.bin.tables, &self.media);
         let lines = &tables.lines[..self.band().lines];
         let StageWorkspace { exact: ExactWorkspace { fast, accurate, .. }, responses } =
             &mut *self.memory;
         responses.resize_with(lines.len(), Vec::new);
         for (line, responses) in lines.iter().zip(responses) {
             if self.accurate {
-                respond(isa, tables, medium, accurate, line, responses);
+                respond(isa, tables, media, accurate, line, responses);
             } else {
-                respond(isa, tables, medium, fast, line, responses);
+                respond(isa, tables, media, fast, line, responses);
             }
         }
         Responded(self)

@@ -132,7 +132,8 @@ mod tests {
 
     fn bits(exact: &Exact, bones: &[Bone]) -> Vec<u64> {
         let mut workspace = ExactWorkspace::default();
-        let velocity = |bone| exact.arrival(bone, &mut workspace).map(|found| found.velocity);
+        let velocity =
+            |bone: &Bone| exact.arrival(bone.into(), &mut workspace).map(|found| found.velocity);
         bones.iter().map(velocity).map(|v| v.map_or(0, f64::to_bits)).collect()
     }
 

@@ -1,20 +1,20 @@
 //! Full pressure traces, direct wave included.
 
-use osteon_common::case::Bone;
+use osteon_common::bone::BoneRef;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
 use osteon_common::probe::Place;
 use osteon_common::sampling::{self, WaveSampling, trace_taper};
 use thiserror::Error;
 
 use crate::exact::direct;
-use crate::exact::plate::AccuratePlate;
+use crate::exact::plate_stack::PlateStack;
 use crate::exact::response::Spectra;
 use crate::exact::signal::Signal;
 use crate::exact::tables::{Tables, Waves};
-use crate::exact::tensor::{FillPlate, Solid};
 use crate::failure::OUT_OF_SCALE;
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
+use crate::media::Media;
 use crate::solver::Solver;
 use crate::vector::Vector;
 
@@ -113,7 +113,21 @@ impl Solver {
     ///
     /// # Errors
     /// If the traces would be empty or too large.
-    pub fn traces(&self, bone: &Bone, duration: f64, time_step: f64) -> Result<Traces, TraceError> {
+    pub fn traces<'a>(
+        &self,
+        bone: impl Into<BoneRef<'a>>,
+        duration: f64,
+        time_step: f64,
+    ) -> Result<Traces, TraceError> {
+        self.traces_of(bone.into(), duration, time_step)
+    }
+
+    fn traces_of(
+        &self,
+        bone: BoneRef<'_>,
+        duration: f64,
+        time_step: f64,
+    ) -> Result<Traces, TraceError> {
         let samples = duration / time_step;
         if !(duration > 0.0 && time_step > 0.0 && samples >= 1.0) {
             return Err(TraceError::Times { duration, time_step });
@@ -122,12 +136,11 @@ impl Solver {
         if pressures(duration, time_step, receivers) > PRESSURES_MAX {
             return Err(TraceError::TooMany { duration, time_step, receivers });
         }
-        let (mut plate, mut spectra) = (AccuratePlate::default(), Spectra::default());
-        let thickness = self.setup().layers.bone_thickness;
-        let medium = self.isa().run(Solid(bone));
-        self.isa().run(FillPlate { medium: &medium, thickness, plate: &mut plate });
+        let (mut plates, mut spectra) = (PlateStack::<11>::default(), Spectra::default());
+        let media = Media::new(self.isa(), bone, self.setup().layers.bone_thickness);
+        plates.fill(self.isa(), &media);
         let coupling = sampling::fastest_in(&self.setup().layers.coupling, self.setup());
-        let speed = sampling::fastest(self.setup(), medium.fastest).max(coupling);
+        let speed = sampling::fastest(self.setup(), media.fastest()).max(coupling);
         let sampling = WaveSampling::for_traces(self.setup(), speed, duration);
         let pairs = sampling.pairs(sampling.whole_band());
         if pairs > SAMPLING_PAIRS_MAX || pairs.is_nan() {
@@ -138,7 +151,7 @@ impl Solver {
         let tables = Tables::new(self.setup(), sampling, Waves::All, amplitude, cut, None);
         let taper = tables.taper(cut);
         spectra.clear(&tables);
-        spectra.fill(self.isa(), &tables, &medium, &mut plate, 0..tables.lines.len());
+        spectra.fill(self.isa(), &tables, &media, &mut plates, 0..tables.lines.len());
         let times: Vec<f64> =
             (0..=(samples + 1e-9) as usize).map(|j| j as f64 * time_step).collect();
         let places = self.setup().probe.places();
@@ -184,7 +197,7 @@ impl Solver {
 
 #[cfg(test)]
 mod tests {
-    use osteon_common::case::Setup;
+    use osteon_common::case::{Bone, Setup};
     use osteon_common::parameters::Point;
     use osteon_common::realization::Ensemble;
     use osteon_common::sampling::{Grade, OuterFaces, direct_arrival, velocity_taper};
@@ -201,18 +214,17 @@ mod tests {
         before: &[f64],
     ) -> Vec<f64> {
         let isa = Isa::fastest();
-        let medium = isa.run(Solid(bone));
-        let (mut plate, mut spectra) = (AccuratePlate::default(), Spectra::default());
-        let thickness = setup.layers.bone_thickness;
-        isa.run(FillPlate { medium: &medium, thickness, plate: &mut plate });
-        let speed = sampling::fastest(setup, medium.fastest);
+        let media = Media::new(isa, bone.into(), setup.layers.bone_thickness);
+        let (mut plates, mut spectra) = (PlateStack::<11>::default(), Spectra::default());
+        plates.fill(isa, &media);
+        let speed = sampling::fastest(setup, media.fastest());
         let bin = sampling::speed_bin(setup, speed).unwrap();
         let sampling = WaveSampling::for_speed_bin(setup, bin, Grade::Full, faces);
         let cut = velocity_taper(sampling.whole_band());
         let tables = Tables::new(setup, sampling, waves, 1.0, cut, None);
         let taper = tables.taper(cut);
         spectra.clear(&tables);
-        spectra.fill(isa, &tables, &medium, &mut plate, 0..tables.lines.len());
+        spectra.fill(isa, &tables, &media, &mut plates, 0..tables.lines.len());
         let receiver_pressures = |(r, place)| {
             let mut spectrum = spectra.receiver(r).to_vec();
             for (run, weights) in spectrum.iter_mut().zip(&taper) {

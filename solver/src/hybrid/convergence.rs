@@ -4,7 +4,8 @@
 //! time: the pulse itself has a kink at t = 0, after which no scheme of high order shows its order.
 //! The pressure at the receivers' height is compared with that of a finer computation.
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::{Bone, BoneRef, Sublayers};
+use osteon_common::case::Setup;
 use osteon_common::outcome::FailureKind;
 
 use super::march::{Limit, LoadResponse, MarchWorkspace};
@@ -93,7 +94,7 @@ pub fn time_step_convergence(
     halvings: u32,
 ) -> Result<Vec<ConvergenceRow>, Failure> {
     let mut study = SmoothLoadStudy::new(setup, bone);
-    let mesh = Mesh::new(setup, bone, &study.scope, setup.solver.refinement.sqrt());
+    let mesh = Mesh::new(setup, &study.bone, &study.scope, setup.solver.refinement.sqrt());
     let limit = study.limit(&mesh);
     let first = study.ratio(limit);
     let finest = first << halvings;
@@ -115,14 +116,14 @@ pub fn time_step_convergence(
 /// One bone under the smooth load.
 struct SmoothLoadStudy<'a> {
     setup: &'a Setup,
-    bone: &'a Bone,
+    bone: Sublayers,
     scope: Scope,
     wavenumbers: Lanes,
     memory: MarchWorkspace,
 }
 
 impl<'a> SmoothLoadStudy<'a> {
-    fn new(setup: &'a Setup, bone: &'a Bone) -> Self {
+    fn new(setup: &'a Setup, bone: &Bone) -> Self {
         let fc = setup.probe.center_frequency;
         let fluid = 2.0 * std::f64::consts::PI * fc / setup.layers.coupling.sound_speed;
         let mut wavenumbers = Lanes::ZERO;
@@ -132,7 +133,7 @@ impl<'a> SmoothLoadStudy<'a> {
         let speed = Medium::new(bone).fastest.max(setup.layers.marrow.sound_speed);
         Self {
             setup,
-            bone,
+            bone: BoneRef::from(bone).sublayers(setup.layers.bone_thickness),
             scope: Scope::until_direct_wave(setup, speed),
             wavenumbers,
             memory: MarchWorkspace::default(),
@@ -141,13 +142,13 @@ impl<'a> SmoothLoadStudy<'a> {
 
     /// The same elements everywhere.
     fn mesh(&self, order: usize, size: f64) -> Mesh {
-        Mesh::with_sizes(self.setup, &self.scope, order, [size; 3])
+        Mesh::with_sizes(self.setup, &self.bone, &self.scope, order, [size; 2], |_| size)
     }
 
     /// Returns the largest stable time step, s.
     fn limit(&mut self, mesh: &Mesh) -> f64 {
         Isa::fastest().run(Limit {
-            operator: &Operator::new(self.setup, self.bone, mesh),
+            operator: &Operator::new(self.setup, &self.bone, mesh),
             wavenumber: self.wavenumbers.0[LANES - 1],
             state: &mut self.memory.state,
         })
@@ -175,7 +176,7 @@ impl<'a> SmoothLoadStudy<'a> {
         }
         let (node, weights) = mesh.receiver(self.setup.probe.receivers.x3);
         Isa::fastest().run(LoadResponse {
-            operator: &Operator::new(self.setup, self.bone, mesh),
+            operator: &Operator::new(self.setup, &self.bone, mesh),
             k: self.wavenumbers,
             times,
             receiver: (node, &weights),

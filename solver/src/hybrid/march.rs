@@ -164,6 +164,7 @@ fn add(factor: Lanes, record: &[Lanes], receiver: &ReceiverSamples, sums: &mut [
 
 #[cfg(test)]
 mod tests {
+    use osteon_common::bone::{BoneRef, Sublayer, Sublayers};
     use osteon_common::case::Setup;
     use osteon_common::parameters::Point;
     use osteon_common::realization::Ensemble;
@@ -174,18 +175,26 @@ mod tests {
     use crate::isa::Isa;
     use crate::{Complex, admittance};
 
-    /// The Laplace transform of a record against the exact admittance of the bone on its marrow.
     #[test]
     fn responses_are_those_of_the_exact_admittance() {
+        let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+        let ensemble = Ensemble::new(&point, 3).unwrap();
+        let bone = |index| ensemble.bone(index).unwrap();
+        check(&BoneRef::from(&bone(1)).sublayers(4e-3));
+        let sublayers = [(1.3e-3, bone(2)), (0.4e-3, bone(3)), (2.3e-3, bone(4))];
+        let sublayers = sublayers.map(|(thickness, solid)| Sublayer { thickness, solid });
+        check(&Sublayers::new(&sublayers).unwrap());
+    }
+
+    /// The Laplace transform of a record against the exact admittance of a bone on its marrow.
+    fn check(bone: &Sublayers) {
         let mut setup = Setup::default();
         // Receivers so far away that every echo is heard: both fluids are meshed whole.
         setup.probe.receivers.first_x1 = 0.1;
         setup.layers.marrow.thickness = 4e-3;
-        let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
-        let bone = Ensemble::new(&point, 3).unwrap().bone(1).unwrap();
-        let mesh =
-            Mesh::with_sizes(&setup, &Scope::until_direct_wave(&setup, 5000.0), 8, [0.4e-3; 3]);
-        let operator = Operator::<1>::new(&setup, &bone, &mesh);
+        let scope = Scope::until_direct_wave(&setup, 5000.0);
+        let mesh = Mesh::with_sizes(&setup, bone, &scope, 8, [0.4e-3; 2], |_| 0.4e-3);
+        let operator = Operator::<1>::new(&setup, bone, &mesh);
         let step = 5e-9;
         // Echoes from the coupling's outer face after 13 µs are weakened by e^-25.
         let (damping, samples) = (1.9e6, 2600);
@@ -223,7 +232,7 @@ mod tests {
             for lane in 0..LANES {
                 let k = k.0[lane];
                 let found = transform(s, &|n| memory.record[n].0[lane]);
-                let z = s * s * admittance(&setup, &bone, k, s).scale(fluid.density);
+                let z = s * s * admittance(&setup, bone, k, s).scale(fluid.density);
                 let root = s * s.scale(1.0 / (fluid.sound_speed * fluid.sound_speed));
                 let g = (root + Complex::new(k * k, 0.0)).sqrt();
                 let incident = transform(s, &|n| pulse(n));

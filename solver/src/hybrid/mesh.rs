@@ -6,7 +6,8 @@
 
 use std::f64::consts::PI;
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::{Bone, Sublayer, Sublayers};
+use osteon_common::case::Setup;
 use osteon_common::sampling::slowness;
 
 use super::element::Element;
@@ -37,7 +38,8 @@ pub(super) struct LayerMesh {
 pub(super) struct Mesh {
     pub(super) element: Element,
     pub(super) coupling: LayerMesh,
-    pub(super) bone: LayerMesh,
+    /// The bone's sublayers, downwards.
+    pub(super) bone: Vec<LayerMesh>,
     pub(super) marrow: LayerMesh,
 }
 
@@ -52,35 +54,43 @@ impl LayerMesh {
 
 impl Mesh {
     /// Creates the mesh for `scope`, with elements `finer` times smaller than in the setup.
-    pub(super) fn new(setup: &Setup, bone: &Bone, scope: &Scope, finer: f64) -> Self {
+    pub(super) fn new(setup: &Setup, bone: &Sublayers, scope: &Scope, finer: f64) -> Self {
         let fc = setup.probe.center_frequency;
         let size = |slowest: f64| {
             let share = (slowest / fc / WAVELENGTH).min(1.0);
             setup.solver.element_size * share / finer
         };
-        let sizes = [
-            size(setup.layers.coupling.sound_speed),
-            size(bone_speed(setup, bone)),
-            size(setup.layers.marrow.sound_speed),
-        ];
-        Self::with_sizes(setup, scope, setup.solver.element_order as usize, sizes)
+        let fluids =
+            [size(setup.layers.coupling.sound_speed), size(setup.layers.marrow.sound_speed)];
+        let in_solid = |solid: &Bone| size(sublayer_speed(setup, solid));
+        let order = setup.solver.element_order as usize;
+        Self::with_sizes(setup, bone, scope, order, fluids, in_solid)
     }
 
-    /// Creates a mesh of elements of degree `order`, none larger than `sizes` (m) in fluid 1, bone
-    /// and fluid 2.
-    pub(super) fn with_sizes(setup: &Setup, scope: &Scope, order: usize, sizes: [f64; 3]) -> Self {
-        let [coupling, bone, marrow] = sizes;
+    /// Creates a mesh of elements of degree `order`, none larger than `fluids` (m) in fluid 1 and fluid 2,
+    /// and what `in_solid` returns (m) in the solids of the bone.
+    pub(super) fn with_sizes(
+        setup: &Setup,
+        bone: &Sublayers,
+        scope: &Scope,
+        order: usize,
+        fluids: [f64; 2],
+        in_solid: impl Fn(&Bone) -> f64,
+    ) -> Self {
+        let [coupling, marrow] = fluids;
+        let sublayer = |one: &Sublayer| LayerMesh::new(one.thickness, in_solid(&one.solid));
         Self {
             element: Element::new(order),
             coupling: LayerMesh::new(coupling_depth(setup, scope), coupling),
-            bone: LayerMesh::new(setup.layers.bone_thickness, bone),
+            bone: bone.iter().map(sublayer).collect(),
             marrow: LayerMesh::new(marrow_depth(setup, scope, marrow), marrow),
         }
     }
 
     /// Returns the number of elements of all layers.
     pub(super) fn elements(&self) -> usize {
-        self.coupling.elements + self.bone.elements + self.marrow.elements
+        let bone: usize = self.bone.iter().map(|sublayer| sublayer.elements).sum();
+        self.coupling.elements + bone + self.marrow.elements
     }
 
     /// Returns the largest relative error of the speed of waves at the centre frequency on this
@@ -89,7 +99,7 @@ impl Mesh {
     ///
     /// Only layers with so few nodes per wavelength that two agreeing meshes prove nothing are
     /// counted; the term is larger than 1 where waves are not resolved at all.
-    pub(super) fn dispersion(&self, setup: &Setup, bone: &Bone) -> f64 {
+    pub(super) fn dispersion(&self, setup: &Setup, bone: &Sublayers) -> f64 {
         let order = self.element.count() - 1;
         let error = |mesh: &LayerMesh, speed: f64| {
             let phase = 2.0 * PI * setup.probe.center_frequency * mesh.size / speed;
@@ -102,8 +112,11 @@ impl Mesh {
                 error * ratio * ratio
             })
         };
+        let of_bone = self.bone.iter().zip(bone.iter()).fold(0.0, |largest: f64, (mesh, one)| {
+            largest.max(error(mesh, sublayer_speed(setup, &one.solid)))
+        });
         error(&self.coupling, setup.layers.coupling.sound_speed)
-            .max(error(&self.bone, bone_speed(setup, bone)))
+            .max(of_bone)
             .max(error(&self.marrow, setup.layers.marrow.sound_speed))
     }
 
@@ -122,12 +135,12 @@ pub(super) fn longest_coupling_path(setup: &Setup, scope: &Scope) -> f64 {
     scope.longest_time_across() / slowness(setup.layers.coupling.sound_speed, scope.speed)
 }
 
-/// Returns the speed, m/s, of the waves for which elements in the bone are made.
+/// Returns the speed, m/s, of the waves for which elements in a sublayer of the bone are made.
 ///
-/// If shear waves in the bone are slower than sound in the coupling fluid, it is the geometric mean
+/// If shear waves in it are slower than sound in the coupling fluid, it is the geometric mean
 /// of the two: the slowest waves contribute little to the first arrival.
-fn bone_speed(setup: &Setup, bone: &Bone) -> f64 {
-    (setup.layers.coupling.sound_speed * Medium::new(bone).slowest_across()).sqrt()
+fn sublayer_speed(setup: &Setup, solid: &Bone) -> f64 {
+    (setup.layers.coupling.sound_speed * Medium::new(solid).slowest_across()).sqrt()
 }
 
 /// Returns the depth of fluid 1 that is meshed, m: the wave goes from the source to the bone, then
@@ -147,6 +160,7 @@ fn marrow_depth(setup: &Setup, scope: &Scope, size: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use osteon_common::bone::BoneRef;
     use osteon_common::elasticity::EngineeringConstants;
 
     use super::*;
@@ -160,6 +174,10 @@ mod tests {
             transverse_poisson_ratio: 0.4495,
         };
         Bone { density: 1598.8, elasticity: constants.elasticity().unwrap() }
+    }
+
+    fn whole(bone: &Bone) -> Sublayers {
+        BoneRef::from(bone).sublayers(4e-3)
     }
 
     #[test]
@@ -177,9 +195,12 @@ mod tests {
         // Four times the density: waves of half the speed, 0.728 mm long; in the fluid 1.5 mm.
         slow.density *= 4.0;
         for (bone, largest) in [(bone(), 0.5e-3 * 0.985), (slow, 0.5e-3 * 0.697)] {
-            let mesh = Mesh::new(&setup, &bone, &scope, 1.0);
+            let mesh = Mesh::new(&setup, &whole(&bone), &scope, 1.0);
             let elements = (4e-3_f64 / largest).ceil();
-            assert_eq!(mesh.bone, LayerMesh { elements: elements as usize, size: 4e-3 / elements });
+            assert_eq!(
+                mesh.bone,
+                [LayerMesh { elements: elements as usize, size: 4e-3 / elements }]
+            );
             assert!((mesh.coupling.size / 0.5e-3 - 1.0).abs() < 0.1);
         }
     }
@@ -199,7 +220,7 @@ mod tests {
     fn fluids_end_where_no_echo_is_heard() {
         let setup = Setup::default();
         let scope = Scope::until_direct_wave(&setup, 3960.1);
-        let mesh = Mesh::new(&setup, &bone(), &scope, 1.0);
+        let mesh = Mesh::new(&setup, &whole(&bone()), &scope, 1.0);
         // By hand, at the farthest receiver: (14.267 - 5.404) µs / 616.99 µs/m is a path of
         // 14.36 mm, half of it 7.18 mm; below, (14.267 - 5.404 - 2.468) µs leaves 5.18 mm.
         let depth = |mesh: &LayerMesh| mesh.elements as f64 * mesh.size;
@@ -209,7 +230,7 @@ mod tests {
         let mut thin = setup;
         thin.layers.coupling.thickness = 4e-3;
         thin.layers.marrow.thickness = 2e-3;
-        let mesh = Mesh::new(&thin, &bone(), &Scope::until_direct_wave(&thin, 3960.1), 1.0);
+        let mesh = Mesh::new(&thin, &whole(&bone()), &Scope::until_direct_wave(&thin, 3960.1), 1.0);
         assert!((depth(&mesh.coupling) - 4e-3).abs() < 1e-12);
         assert!((depth(&mesh.marrow) - 2e-3).abs() < 1e-12);
     }

@@ -18,19 +18,23 @@
 //! ```
 //!
 //! (`solid.rs` says in which form it is computed), and a node that two elements of a layer share
-//! takes the mean of the two. Displacements are multiplied by a stiffness per length, which makes
+//! takes the mean of the two. Between two sublayers of the bone masses and axes differ (`interface.rs`).
+//! Displacements are multiplied by a stiffness per length, which makes
 //! them comparable with pressures.
 
 mod axes;
 mod fluid;
 mod halves;
+mod interface;
 mod shared_node;
 mod sink;
 mod solid;
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::{Sublayer, Sublayers};
+use osteon_common::case::Setup;
 
 use self::fluid::FluidLayer;
+use self::interface::Interface;
 pub(super) use self::sink::{Keep, Sink};
 use self::solid::SolidLayer;
 pub(super) use self::solid::{SOLID, Scratch};
@@ -43,27 +47,42 @@ const MARROW: usize = 2;
 /// A length by which displacements are scaled, m.
 const LENGTH: f64 = 1e-3;
 
-/// The operator A of one bone. A state consists of fluid 1, solid, fluid 2, each by ascending x3.
+/// The operator A of one bone. A state consists of fluid 1, solid, fluid 2, each by ascending x3. Each
+/// sublayer of the solid has nodes of its own on both faces.
 ///
 /// `COUPLING` is the number of real numbers per node of fluid 1: its pressure is even in x1, so 1,
 /// its real part, is sufficient; with 2 the imaginary part is computed, and comes out as zero.
 #[derive(Debug, Clone)]
 pub(super) struct Operator<const COUPLING: usize> {
     coupling: FluidLayer,
-    solid: SolidLayer,
+    /// The lowest sublayer of the bone.
+    lowest: SolidLayer,
+    /// Those above it, upwards, each with what is below it.
+    upper: Vec<(Interface, SolidLayer)>,
     marrow: FluidLayer,
 }
 
 impl<const COUPLING: usize> Operator<COUPLING> {
-    pub(super) fn new(setup: &Setup, bone: &Bone, mesh: &Mesh) -> Self {
+    pub(super) fn new(setup: &Setup, bone: &Sublayers, mesh: &Mesh) -> Self {
         let element = &mesh.element;
         let scale = setup.layers.coupling.density
             * setup.layers.coupling.sound_speed
             * setup.layers.coupling.sound_speed
             / LENGTH;
+        let solid =
+            |sublayer: &Sublayer, mesh| SolidLayer::new(&sublayer.solid, mesh, element, scale);
+        // Sublayers are listed downwards.
+        let mut lowest = solid(bone.uppermost(), &mesh.bone[0]);
+        let mut upper = Vec::with_capacity(bone.lower().len());
+        for (sublayer, mesh) in bone.lower().iter().zip(&mesh.bone[1..]) {
+            let below = solid(sublayer, mesh);
+            upper.push((Interface::new(&below, &lowest), std::mem::replace(&mut lowest, below)));
+        }
+        upper.reverse();
         Self {
             coupling: FluidLayer::new(&setup.layers.coupling, &mesh.coupling, element, scale),
-            solid: SolidLayer::new(bone, &mesh.bone, element, scale),
+            lowest,
+            upper,
             marrow: FluidLayer::new(&setup.layers.marrow, &mesh.marrow, element, scale),
         }
     }
@@ -79,9 +98,16 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         let nodes = |elements: usize, count: usize| elements * (count - 1) + 1;
         (
             nodes(self.coupling.elements, self.coupling.count) * COUPLING,
-            nodes(self.solid.elements, self.solid.count) * SOLID,
+            self.sublayers().map(|(_, sublayer)| sublayer.len()).sum(),
             nodes(self.marrow.elements, self.marrow.count) * MARROW,
         )
+    }
+
+    /// Returns each sublayer with what is below it, upwards.
+    #[inline(always)]
+    fn sublayers(&self) -> impl Iterator<Item = (Option<&Interface>, &SolidLayer)> {
+        let upper = self.upper.iter().map(|(interface, sublayer)| (Some(interface), sublayer));
+        [(None, &self.lowest)].into_iter().chain(upper)
     }
 
     /// Computes `out` = A `x` + the effect of the pressure `load` on the upper face; `sink`
@@ -102,18 +128,32 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         let (p1_out, rest) = out.split_at_mut(coupling);
         let (u_out, p2_out) = rest.split_at_mut(solid);
 
-        self.solid.apply::<V, S>(k, u, scratch, u_out, coupling, sink);
+        let (lowest, mut uppermost) = (&self.lowest, &self.lowest);
+        let mut end = 0;
+        for (below, sublayer) in self.sublayers() {
+            let start = end;
+            end += sublayer.len();
+            let (u, out) = (&u[start..end], &mut u_out[start..end]);
+            sublayer.apply::<V, S>(k, u, scratch, out, coupling + start, sink);
+            if let Some(interface) = below {
+                let faces = &mut u_out[start - SOLID..start + SOLID];
+                let (lower, upper) = faces.split_at_mut(SOLID);
+                interface.join(lower, upper);
+                sink.take::<V>(coupling + start - SOLID, faces);
+            }
+            uppermost = sublayer;
+        }
         let top = solid - SOLID;
         let face = marrow - MARROW;
         let on_top = [p1[0] + load, if COUPLING == 2 { p1[1] } else { Lanes::ZERO }];
-        self.push(&mut u_out[top..], on_top.map(|p| -p));
-        self.push(&mut u_out[..SOLID], [p2[face], p2[face + 1]]);
+        uppermost.push(&mut u_out[top..], on_top.map(|p| -p));
+        lowest.push(&mut u_out[..SOLID], [p2[face], p2[face + 1]]);
         sink.take::<V>(coupling, &u_out[..SOLID]);
         sink.take::<V>(coupling + top, &u_out[top..]);
 
         self.coupling.apply::<COUPLING, V, S>(k, p1, p1_out, 0, sink);
         let drive = Lanes::splat(self.coupling.drive);
-        let moved = self.component_across(&u_out[top..]);
+        let moved = uppermost.component_across(&u_out[top..]);
         for c in 0..COUPLING {
             p1_out[c] = drive.mul_add(moved[c], p1_out[c]);
         }
@@ -122,35 +162,12 @@ impl<const COUPLING: usize> Operator<COUPLING> {
 
         self.marrow.apply::<MARROW, V, S>(k, p2, p2_out, coupling + solid, sink);
         let drive = Lanes::splat(-self.marrow.drive);
-        let moved = self.component_across(&u_out[..SOLID]);
+        let moved = lowest.component_across(&u_out[..SOLID]);
         for c in 0..MARROW {
             p2_out[face + c] = drive.mul_add(moved[c], p2_out[face + c]);
         }
         p2_out[..MARROW].fill(Lanes::ZERO);
         sink.take::<V>(coupling + solid + face, &p2_out[face..]);
-    }
-
-    /// Adds the effect of the pressure `p` (real and imaginary part) on a face, which it pushes
-    /// upwards.
-    #[inline(always)]
-    fn push(&self, face: &mut [Lanes], p: [Lanes; 2]) {
-        for i in 0..3 {
-            let drive = Lanes::splat(self.solid.drive[i]);
-            face[i] = drive.mul_add(p[0], face[i]);
-            face[i + 3] = drive.mul_add(p[1], face[i + 3]);
-        }
-    }
-
-    /// Returns the component across the layers, its real and imaginary part.
-    #[inline(always)]
-    fn component_across(&self, face: &[Lanes]) -> [Lanes; 2] {
-        let mut across = [Lanes::ZERO; 2];
-        for i in 0..3 {
-            let depth = Lanes::splat(self.solid.depth[i]);
-            across[0] = depth.mul_add(face[i], across[0]);
-            across[1] = depth.mul_add(face[i + 3], across[1]);
-        }
-        across
     }
 }
 

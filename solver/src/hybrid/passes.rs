@@ -1,6 +1,7 @@
 //! Computes one bone in passes, each finer than the one before, until the picked times converge.
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::Sublayers;
+use osteon_common::case::Setup;
 use osteon_common::outcome::FailureKind;
 
 use super::incident::Incident;
@@ -49,7 +50,7 @@ pub(super) struct Passes<'a> {
     /// Distances of the receivers from the source, m.
     pub(super) distances: &'a [f64],
     pub(super) isa: Isa,
-    pub(super) bone: &'a Bone,
+    pub(super) bone: &'a Sublayers,
     /// The windows up to the direct wave.
     pub(super) whole: Scope,
     pub(super) memory: &'a mut MarchWorkspace,

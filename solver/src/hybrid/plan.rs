@@ -3,7 +3,8 @@
 
 use std::f64::consts::PI;
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::bone::Sublayers;
+use osteon_common::case::Setup;
 use osteon_common::outcome::FailureKind;
 use osteon_common::probe::Place;
 use osteon_common::sampling::{earliest_arrival, nearest_and_farthest, smooth_step};
@@ -108,7 +109,7 @@ impl Plan {
     /// `NoConvergence` if the mesh would be too large.
     pub(super) fn new(
         setup: &Setup,
-        bone: &Bone,
+        bone: &Sublayers,
         scope: &Scope,
         finer: f64,
     ) -> Result<Self, Failure> {

@@ -1,4 +1,4 @@
-//! The contribution of the bone to the operator.
+//! The contribution of one sublayer of the bone to the operator.
 //!
 //! Displacements are taken along the principal axes of A33, where it is diagonal; masses are the
 //! same along all axes. With W the weights of integration, E = W⁻¹ Dᵀ W / J, and at the nodes of
@@ -10,7 +10,7 @@
 //! ```
 //!
 //! and the last term is the same, except for its sign, in two elements that share a node: it
-//! remains only on the faces of the bone.
+//! remains only on the faces of the sublayer.
 
 use osteon_common::case::Bone;
 
@@ -28,7 +28,7 @@ use crate::vector::Vector;
 pub(in crate::hybrid) const SOLID: usize = 6;
 pub(super) type ElementNode = [Lanes; SOLID];
 
-/// The bone between its fluids.
+/// One sublayer of the bone.
 #[derive(Debug, Clone)]
 pub(super) struct SolidLayer {
     pub(super) elements: usize,
@@ -47,10 +47,12 @@ pub(super) struct SolidLayer {
     a11: Matrix3,
     /// A31 / (ρ w J) at a face.
     edge: Matrix3,
-    /// x3 along each principal axis.
-    pub(super) depth: [f64; 3],
+    /// The principal axes, as columns.
+    pub(super) axes: Matrix3,
+    /// Mass of a node on a face, kg/m².
+    pub(super) face_mass: f64,
     /// (Scaled) acceleration of a face per pressure there, along each principal axis.
-    pub(super) drive: [f64; 3],
+    drive: [f64; 3],
 }
 
 /// The coefficients at eight wavenumbers, halved as above.
@@ -96,9 +98,15 @@ impl SolidLayer {
             mixed: each(&|i, m| 0.5 * (a31[i][m] + a31[m][i])),
             a11: each(&|i, m| -0.5 * a11[i][m]),
             edge: each(&|i, m| at_face * a31[i][m]),
-            depth: axes[2],
+            axes,
+            face_mass: bone.density / at_face,
             drive: axes[2].map(|axis| axis * scale * at_face / bone.density),
         }
+    }
+
+    /// Returns the number of real numbers (in each lane) of its state.
+    pub(super) fn len(&self) -> usize {
+        (self.elements * (self.count - 1) + 1) * SOLID
     }
 
     /// Computes `out` from `u`, whose first number is at `offset` in a state; no pressure acts. The
@@ -261,6 +269,29 @@ impl SolidLayer {
             (force[i], force[i + 3]) = (re, im);
         }
         force
+    }
+
+    /// Adds the effect of the pressure `p` (real and imaginary part) on a face, which it pushes
+    /// upwards.
+    #[inline(always)]
+    pub(super) fn push(&self, face: &mut [Lanes], p: [Lanes; 2]) {
+        for i in 0..3 {
+            let drive = Lanes::splat(self.drive[i]);
+            face[i] = drive.mul_add(p[0], face[i]);
+            face[i + 3] = drive.mul_add(p[1], face[i + 3]);
+        }
+    }
+
+    /// Returns the component across the layers, its real and imaginary part.
+    #[inline(always)]
+    pub(super) fn component_across(&self, face: &[Lanes]) -> [Lanes; 2] {
+        let mut across = [Lanes::ZERO; 2];
+        for i in 0..3 {
+            let depth = Lanes::splat(self.axes[2][i]);
+            across[0] = depth.mul_add(face[i], across[0]);
+            across[1] = depth.mul_add(face[i + 3], across[1]);
+        }
+        across
     }
 
     /// Adds ik A31 u / (ρ w J), the boundary term of the summation by parts at the lower face; with

@@ -1,3 +1,5 @@
+use osteon_common::bone::{Bone, BoneRef};
+use osteon_common::case::Setup;
 use osteon_common::layers::Fluid;
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
@@ -16,6 +18,10 @@ fn bone() -> Bone {
     Ensemble::new(&point, 11).unwrap().bone(0).unwrap()
 }
 
+fn whole() -> Sublayers {
+    BoneRef::from(&bone()).sublayers(4e-3)
+}
+
 /// Two unlike fluids, and layers of unlike elements.
 fn setup() -> Setup {
     let mut setup = Setup::default();
@@ -26,12 +32,8 @@ fn setup() -> Setup {
 }
 
 fn mesh() -> Mesh {
-    Mesh::with_sizes(
-        &setup(),
-        &Scope::until_direct_wave(&setup(), 4500.0),
-        6,
-        [0.7e-3, 0.9e-3, 0.8e-3],
-    )
+    let scope = Scope::until_direct_wave(&setup(), 4500.0);
+    Mesh::with_sizes(&setup(), &whole(), &scope, 6, [0.7e-3, 0.8e-3], |_| 0.9e-3)
 }
 
 fn wavenumbers() -> Lanes {
@@ -91,7 +93,7 @@ fn inner<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes], y: &[Lan
         sum = (Lanes::splat(mass) * x[i]).mul_add(with, sum);
     };
     // Displacements carry `scale`, once in each factor.
-    let solid_masses = masses(&mesh.bone, &mesh.element, bone.density / (scale * scale));
+    let solid_masses = masses(&mesh.bone[0], &mesh.element, bone.density / (scale * scale));
     for (node, &mass) in solid_masses.iter().enumerate() {
         for c in 0..SOLID {
             let i = coupling + node * SOLID + c;
@@ -114,7 +116,7 @@ fn inner<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes], y: &[Lan
 
 #[test]
 fn the_operator_is_self_adjoint_and_not_positive() {
-    let operator = Operator::<2>::new(&setup(), &bone(), &mesh());
+    let operator = Operator::<2>::new(&setup(), &whole(), &mesh());
     let k = wavenumbers();
     let (x, y) = (noise(&operator, 1), noise(&operator, 2));
     let one = inner(&operator, k, &x, &apply(&operator, k, &y));
@@ -128,7 +130,7 @@ fn the_operator_is_self_adjoint_and_not_positive() {
 
 #[test]
 fn energy_without_source_is_conserved() {
-    let operator = Operator::<2>::new(&setup(), &bone(), &mesh());
+    let operator = Operator::<2>::new(&setup(), &whole(), &mesh());
     let k = wavenumbers();
     let mut state = WaveState::default();
     let step = 0.9 * stability_limit::<Scalar, _>(&operator, k.0[LANES - 1], &mut state);
@@ -164,7 +166,7 @@ fn energy_without_source_is_conserved() {
 
 /// Drives the bone's face by a smooth load; the states of fluid 1 at the end.
 fn drive_face<const C: usize>() -> Vec<Lanes> {
-    let operator = Operator::<C>::new(&setup(), &bone(), &mesh());
+    let operator = Operator::<C>::new(&setup(), &whole(), &mesh());
     let k = wavenumbers();
     let mut state = WaveState::default();
     let step = stability_limit::<Scalar, _>(&operator, k.0[LANES - 1], &mut state);
@@ -197,7 +199,7 @@ fn the_pressure_in_fluid_1_is_real_for_a_triclinic_bone() {
 
 #[test]
 fn steps_above_the_limit_grow_without_bound_and_those_below_do_not() {
-    let operator = Operator::<1>::new(&setup(), &bone(), &mesh());
+    let operator = Operator::<1>::new(&setup(), &whole(), &mesh());
     let k = Lanes::splat(4900.0);
     let mut state = WaveState::default();
     let limit = stability_limit::<Scalar, _>(&operator, 4900.0, &mut state);

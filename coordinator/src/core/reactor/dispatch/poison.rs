@@ -124,7 +124,7 @@ fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> Str
     let case = || {
         let ensemble = specification.ensemble(point).ok()?;
         let bone = ensemble.bone(index).ok()?;
-        Some(Case { setup: ensemble.setup(index, &specification.setup), bone })
+        Some(Case { setup: ensemble.setup(index, &specification.setup), bone: bone.into() })
     };
     case().map_or_else(String::new, |case| case_file::to_toml(&case))
 }

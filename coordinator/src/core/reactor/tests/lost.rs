@@ -229,7 +229,7 @@ fn a_bad_node_alone_is_given_up_in_the_end() {
     let Case { setup, bone } = case_file::parse(text, Format::Toml).unwrap();
     let specification = propagation(1);
     let ensemble = Ensemble::new(&specification.start(), specification.monte_carlo.seed).unwrap();
-    assert_eq!((setup, bone), (specification.setup, ensemble.bone(0).unwrap()));
+    assert_eq!((setup, bone), (specification.setup, ensemble.bone(0).unwrap().into()));
 }
 
 #[test]
