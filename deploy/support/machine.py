@@ -31,9 +31,9 @@ def output(*command, **options):
 
 
 @functools.cache
-def options_of(command):
-    """The options that a command of the program knows."""
-    words = output(OSTEON, command, "--help").split()
+def options_of(*command):
+    """The options that a command of the program knows; it may have several words."""
+    words = output(OSTEON, *command, "--help").split()
     return {word.strip("[],.()") for word in words if word.startswith("--")}
 
 
