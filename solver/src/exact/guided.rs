@@ -113,7 +113,7 @@ struct FreeBone {
 
 /// What counts the waves of a bone.
 enum WaveCounter {
-    Plate { isa: Isa, medium: Medium, plate: Box<AccuratePlate> },
+    Plate { isa: Isa, medium: Box<Medium>, plate: Box<AccuratePlate> },
     Stack(FreeStack),
 }
 
@@ -123,7 +123,7 @@ impl FreeBone {
             let MediumLayer { medium, thickness } = media.uppermost.clone();
             let mut plate = Box::<AccuratePlate>::default();
             isa.run(Fill { medium: &medium, thickness, doublings_min: 1, plate: &mut plate });
-            WaveCounter::Plate { isa, medium, plate }
+            WaveCounter::Plate { isa, medium: Box::new(medium), plate }
         } else {
             WaveCounter::Stack(FreeStack::new(isa, media, symmetry.halves()))
         };
