@@ -1,6 +1,6 @@
 //! Materials by name in job and case files.
 
-#![expect(clippy::unwrap_used, reason = "a helper of tests fails the test")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a helper of tests fails the test")]
 
 mod support;
 

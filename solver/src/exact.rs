@@ -72,6 +72,10 @@ const BEFORE_ECHO: (f64, f64) = (0.0, 0.1);
 /// Ratio of a pick to the largest wave in its window below which an echo may hide it as noise.
 const FAINT: f64 = 10.0 * picking::FLOOR;
 
+/// Ratio of the stated error of a bone of sublayers to the one that a plate's rules estimate. Of 889 random
+/// stacks of 2 to 8 sublayers, 14 had errors beyond the latter, 6 or fewer of them by more than this.
+const SUBLAYERS_FACTOR: f64 = 2.0;
+
 /// The exact method for one setup, with the tables that all its realizations share. Clones share
 /// them.
 #[derive(Debug, Clone)]
@@ -113,7 +117,8 @@ impl Exact {
             found = self.with_echoes(found, passes.run_in_bins(), speed);
         }
         let BonePasses { count, pairs, .. } = passes;
-        found.map(|found| found.arrival(count, pairs))
+        let factor = if media.lower.is_empty() { 1.0 } else { SUBLAYERS_FACTOR };
+        found.map(|found| found.arrival(count, pairs, factor))
     }
 
     /// Returns whether reflections of the outer faces may change the pick that was found without

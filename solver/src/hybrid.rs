@@ -17,7 +17,7 @@
 //!
 //! - in all passes but the first, elements are at most `element_size`, and smaller where waves at
 //!   the centre frequency are shorter than 1.5 mm: in a fluid in proportion to its wavelength, in
-//!   the bone to the geometric mean of its slowest wavelength across and the coupling's;
+//!   a sublayer of the bone to the geometric mean of its slowest wavelength across and the coupling's;
 //! - a time step above the bone's stability limit in the first pass is a failure that names the
 //!   limit; without a given time step the step is the limit. The other passes use the same fraction
 //!   of their own limits;

@@ -71,8 +71,10 @@ fn equal_sublayers_are_one_plate_to_the_bit() {
     }
 }
 
+type Change = fn(&mut Setup);
+
 /// Setups in which every part of the exact method has a plate and a stack of the same solid.
-const CHANGES: [(&str, fn(&mut Setup)); 4] = [
+const CHANGES: [(&str, Change); 4] = [
     ("default", |_| ()),
     ("attenuated", |s| s.layers.bone_attenuation.quality_factor = Some(15.0)),
     ("tilted, in both directions", |s| (s.probe.tilt, s.probe.bidirectional) = (0.02, true)),
@@ -144,14 +146,9 @@ fn sublayers_of_one_solid_have_the_guided_waves_of_a_plate() {
 fn mirrored(bone: &Bone, axis: usize) -> Bone {
     const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1)];
     let odd = |i: usize| (PAIRS[i].0 == axis) != (PAIRS[i].1 == axis);
-    let mut rows = *bone.elasticity.rows();
-    for i in 0..6 {
-        for j in 0..6 {
-            if odd(i) != odd(j) {
-                rows[i][j] = -rows[i][j];
-            }
-        }
-    }
+    let given = bone.elasticity.rows();
+    let sign = |i, j| if odd(i) == odd(j) { 1.0 } else { -1.0 };
+    let rows = std::array::from_fn(|i| std::array::from_fn(|j| sign(i, j) * given[i][j]));
     Bone { elasticity: Elasticity::new(rows).unwrap(), ..*bone }
 }
 
@@ -206,4 +203,21 @@ fn a_gradient_moves_the_velocity_to_the_stiffer_side() {
     assert!(stiff_skin > stiff_marrow, "{stiff_skin} against {stiff_marrow} m/s");
     // √1.2 is the ratio of the stiffest sublayer's speeds.
     assert!(stiff_skin < 1.2_f64.sqrt() * mean, "{stiff_skin} against {mean} m/s");
+}
+
+/// The stated error bounds the difference from a refined solution, also in thin sublayers.
+#[test]
+fn stated_errors_of_sublayers_hold() {
+    for (thickness, count) in [(4e-3, 3_u32), (4e-3, 7), (1e-3, 4)] {
+        for index in 0..3 {
+            let each = |i| (thickness / f64::from(count), draw(0.2, 10 * index + u64::from(i)));
+            let sublayers = stack(&(0..count).map(each).collect::<Vec<_>>());
+            let mut setup = with_thickness(&Setup::default(), &sublayers);
+            let found = arrival(&setup, &sublayers);
+            setup.solver.refinement = 5.0;
+            let error = (found.velocity / arrival(&setup, &sublayers).velocity - 1.0).abs();
+            let stated = found.estimated_error;
+            assert!(error < stated, "{count} of {thickness} m, {index}: {error:e}, {stated:e}");
+        }
+    }
 }

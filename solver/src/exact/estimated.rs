@@ -39,9 +39,10 @@ impl Estimated {
         }
     }
 
-    /// Returns the arrival, found in `count` passes with this total number of pairs.
-    pub(crate) fn arrival(self, count: u32, pairs_computed: u64) -> Arrival {
-        let estimated_error = self.error();
+    /// Returns the arrival, found in `count` passes with this total number of pairs; its stated error is the
+    /// estimate times `factor`.
+    pub(crate) fn arrival(self, count: u32, pairs_computed: u64, factor: f64) -> Arrival {
+        let estimated_error = limit_to_one(factor * self.error());
         let Self { pick, sampled: last, .. } = self;
         Arrival {
             velocity: pick.velocity,

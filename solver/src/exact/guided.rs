@@ -113,7 +113,7 @@ struct FreeBone {
 
 /// What counts the waves of a bone.
 enum WaveCounter {
-    Plate { isa: Isa, medium: Box<Medium>, plate: Box<AccuratePlate> },
+    Plate { isa: Isa, plate: Box<(Medium, AccuratePlate)> },
     Stack(FreeStack),
 }
 
@@ -121,9 +121,10 @@ impl FreeBone {
     fn new(isa: Isa, media: &Media, symmetry: Symmetry) -> Self {
         let counter = if media.lower.is_empty() {
             let MediumLayer { medium, thickness } = media.uppermost.clone();
-            let mut plate = Box::<AccuratePlate>::default();
-            isa.run(Fill { medium: &medium, thickness, doublings_min: 1, plate: &mut plate });
-            WaveCounter::Plate { isa, medium: Box::new(medium), plate }
+            let mut plate = Box::new((medium, AccuratePlate::default()));
+            let (medium, filled) = &mut *plate;
+            isa.run(Fill { medium, thickness, doublings_min: 1, plate: filled });
+            WaveCounter::Plate { isa, plate }
         } else {
             WaveCounter::Stack(FreeStack::new(isa, media, symmetry.halves()))
         };
@@ -173,7 +174,8 @@ impl FreeBone {
     /// `None` if a number is not finite.
     fn count(&mut self, family: &Family, k: f64, omega: f64) -> Option<u64> {
         let mut at = |k: f64| match &mut self.counter {
-            WaveCounter::Plate { isa, medium, plate } => {
+            WaveCounter::Plate { isa, plate } => {
+                let (medium, plate) = &mut **plate;
                 isa.run(CountWaves { medium, plate, family, k, omega })
             }
             WaveCounter::Stack(stack) => stack.count(family, k, omega),

@@ -156,7 +156,7 @@ impl Observed<'_, '_> {
         let Filled { prepared, bin, memory, .. } = &*self.0;
         let band = self.0.band();
         let found = pass::pick_with_error(prepared, bin, band, &memory.exact)?;
-        Ok(found.arrival(1, band.sampled.pairs))
+        Ok(found.arrival(1, band.sampled.pairs, 1.0))
     }
 }
 
