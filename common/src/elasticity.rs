@@ -102,6 +102,24 @@ pub enum Inadmissible {
 const ASYMMETRY_MAX: f64 = 1e-9;
 
 impl Elasticity {
+    /// Creates the elasticity of a solid that is transversely isotropic about axis 1, from its independent
+    /// Kelvin-Mandel entries 11, 12, 22, 23, 44 and 55, Pa; 44 must be 22 less 23.
+    ///
+    /// # Errors
+    /// If an entry is not finite, or if the matrix is not positive definite.
+    pub(crate) fn transversely_isotropic(
+        [c11, c12, c22, c23, c44, c55]: [f64; 6],
+    ) -> Result<Self, NotElastic> {
+        Self::new([
+            [c11, c12, c12, 0.0, 0.0, 0.0],
+            [c12, c22, c23, 0.0, 0.0, 0.0],
+            [c12, c23, c22, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, c44, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, c55, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, c55],
+        ])
+    }
+
     /// Creates the elasticity with the given Kelvin-Mandel rows, Pa.
     ///
     /// Mirrored entries may differ by 1e-9 of √(C_ii C_jj); then their mean is taken.
@@ -199,16 +217,9 @@ impl EngineeringConstants {
         // 2 g_T = e_T / (1 + ν_T) is not a free constant.
         let c44 = e_t / (1.0 + nu_t);
         let c55 = 2.0 * self.longitudinal_shear_modulus;
-        let rows = [
-            [c11, c12, c12, 0.0, 0.0, 0.0],
-            [c12, c22, c23, 0.0, 0.0, 0.0],
-            [c12, c23, c22, 0.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0, c44, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 0.0, c55, 0.0],
-            [0.0, 0.0, 0.0, 0.0, 0.0, c55],
-        ];
         // In exact arithmetic this always succeeds; rounding can make it fail at the very edge.
-        Elasticity::new(rows).map_err(|_| Inadmissible::NotPositiveDefinite { margin })
+        Elasticity::transversely_isotropic([c11, c12, c22, c23, c44, c55])
+            .map_err(|_| Inadmissible::NotPositiveDefinite { margin })
     }
 
     /// Returns every violated condition of admissibility; none for an admissible solid.

@@ -27,14 +27,15 @@ pub struct HillModuli {
     pub axial_shear: f64,
 }
 
-/// What surrounds the pores opposes to a change of their form, Pa.
+/// The stiffness with which the material around a pore resists a change of the pore's cross section (Hill's
+/// constraint), Pa. Each number adds to the modulus of the same name.
 #[derive(Debug, Clone, Copy)]
 struct Constraint {
-    /// Against a change of area, beside the plane bulk modulus.
+    /// Against a change of its area.
     plane_bulk: f64,
-    /// Against a change of the cross section's shape, beside the transverse shear modulus.
+    /// Against a change of its shape.
     transverse_shear: f64,
-    /// Against shear along the axis, beside the axial shear modulus.
+    /// Against shear along the axis.
     axial_shear: f64,
 }
 
@@ -67,18 +68,10 @@ impl HillModuli {
     /// # Errors
     /// If one is not finite, or the elasticity not positive definite.
     pub fn elasticity(&self) -> Result<Elasticity, NotElastic> {
-        let (n, l) = (self.axial, self.cross);
         let c22 = self.plane_bulk + self.transverse_shear;
         let c23 = self.plane_bulk - self.transverse_shear;
         let (c44, c55) = (2.0 * self.transverse_shear, 2.0 * self.axial_shear);
-        Elasticity::new([
-            [n, l, l, 0.0, 0.0, 0.0],
-            [l, c22, c23, 0.0, 0.0, 0.0],
-            [l, c23, c22, 0.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0, c44, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 0.0, c55, 0.0],
-            [0.0, 0.0, 0.0, 0.0, 0.0, c55],
-        ])
+        Elasticity::transversely_isotropic([self.axial, self.cross, c22, c23, c44, c55])
     }
 
     /// Returns the Mori-Tanaka estimate of this solid with pores of a fluid that take the fraction

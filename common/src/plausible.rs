@@ -191,19 +191,19 @@ const DISPERSION: PlausibleRange = PlausibleRange {
 
 impl PlausibleRange {
     /// Returns the prior knowledge about a parameter.
-    pub fn known_of(parameter: Parameter) -> Self {
+    pub fn known_of(parameter: Parameter) -> &'static Self {
         match parameter {
-            Parameter::Density => DENSITY,
+            Parameter::Density => &DENSITY,
             Parameter::LongitudinalYoungModulus
             | Parameter::LongitudinalShearModulus
-            | Parameter::TransverseYoungModulus => MODULUS,
+            | Parameter::TransverseYoungModulus => &MODULUS,
             Parameter::LongitudinalPoissonRatio | Parameter::TransversePoissonRatio => {
-                POISSON_RATIO
+                &POISSON_RATIO
             }
-            Parameter::Dispersion => DISPERSION,
-            Parameter::BoneThickness => BONE_THICKNESS,
-            Parameter::BoneQualityFactor => QUALITY_FACTOR,
-            Parameter::CouplingSoundSpeed => SOUND_SPEED,
+            Parameter::Dispersion => &DISPERSION,
+            Parameter::BoneThickness => &BONE_THICKNESS,
+            Parameter::BoneQualityFactor => &QUALITY_FACTOR,
+            Parameter::CouplingSoundSpeed => &SOUND_SPEED,
         }
     }
 

@@ -28,10 +28,10 @@ pub const ACCEPTED: Interval = Interval::from_below(0.0, 0.5, "of the volume");
 /// An estimate of the stiffness of a solid with pores.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Homogenisation {
-    /// Of T. Mori and K. Tanaka: around the pores is the matrix.
+    /// The estimate of T. Mori and K. Tanaka: each pore lies in the matrix.
     #[default]
     MoriTanaka,
-    /// Of R. Hill: around the pores is the porous bone.
+    /// R. Hill's self-consistent estimate: each pore lies in the porous bone.
     SelfConsistent,
 }
 
@@ -53,7 +53,7 @@ pub struct BoneMatrix {
     pub constants: EngineeringConstants,
 }
 
-/// What a porosity means for density and elasticity.
+/// How density and elasticity are computed from a porosity.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PorosityModel {
     /// The estimate.
@@ -164,42 +164,23 @@ impl Section for PorosityModel {
 impl Section for BoneMatrix {
     fn declare(&mut self, fields: &mut dyn Fields) {
         let constants = &mut self.constants;
-        let declared: [(Parameter, &mut f64, &'static PlausibleRange); 6] = [
-            (Parameter::Density, &mut self.density, &plausible::DENSITY),
-            (
-                Parameter::LongitudinalYoungModulus,
-                &mut constants.longitudinal_young_modulus,
-                &plausible::MODULUS,
-            ),
-            (
-                Parameter::LongitudinalPoissonRatio,
-                &mut constants.longitudinal_poisson_ratio,
-                &plausible::POISSON_RATIO,
-            ),
-            (
-                Parameter::LongitudinalShearModulus,
-                &mut constants.longitudinal_shear_modulus,
-                &plausible::MODULUS,
-            ),
-            (
-                Parameter::TransverseYoungModulus,
-                &mut constants.transverse_young_modulus,
-                &plausible::MODULUS,
-            ),
-            (
-                Parameter::TransversePoissonRatio,
-                &mut constants.transverse_poisson_ratio,
-                &plausible::POISSON_RATIO,
-            ),
+        let declared: [(Parameter, &mut f64); 6] = [
+            (Parameter::Density, &mut self.density),
+            (Parameter::LongitudinalYoungModulus, &mut constants.longitudinal_young_modulus),
+            (Parameter::LongitudinalPoissonRatio, &mut constants.longitudinal_poisson_ratio),
+            (Parameter::LongitudinalShearModulus, &mut constants.longitudinal_shear_modulus),
+            (Parameter::TransverseYoungModulus, &mut constants.transverse_young_modulus),
+            (Parameter::TransversePoissonRatio, &mut constants.transverse_poisson_ratio),
         ];
-        for (parameter, field, range) in declared {
+        for (parameter, field) in declared {
             let row = parameter.row();
             let meaning = match parameter {
                 Parameter::Density => "mass density of the matrix",
                 _ => row.meaning,
             };
             let key = Key { name: row.name, meaning };
-            fields.number(key, field, Number::plausible(row.accepted, range));
+            let number = Number::plausible(row.accepted, PlausibleRange::known_of(parameter));
+            fields.number(key, field, number);
         }
     }
 }

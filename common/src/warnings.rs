@@ -141,7 +141,7 @@ impl Warnings {
             Range::Free { .. } => "start",
         };
         let field = format!("parameters.{}.{key}", parameter.name());
-        self.number(&field, range.start(), &PlausibleRange::known_of(parameter));
+        self.number(&field, range.start(), PlausibleRange::known_of(parameter));
     }
 
     /// Names, for each quantity that is known of the groups, the first group whose value is unusual.

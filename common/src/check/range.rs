@@ -15,12 +15,12 @@ pub(super) fn range(parameter: Parameter, range: Range, violations: &mut Violati
     let (accepted, kind) = (parameter.row().accepted, PlausibleRange::known_of(parameter));
     match range {
         Range::Fixed(value) => {
-            quantity(&format!("{path}.fixed"), value, accepted, &kind, violations);
+            quantity(&format!("{path}.fixed"), value, accepted, kind, violations);
         }
         Range::Free { start, lower, upper } => {
             let (start_path, bounds_path) = (format!("{path}.start"), format!("{path}.bounds"));
-            quantity(&start_path, start, accepted, &kind, violations);
-            bounds(&bounds_path, [lower, upper], accepted, &kind, violations);
+            quantity(&start_path, start, accepted, kind, violations);
+            bounds(&bounds_path, [lower, upper], accepted, kind, violations);
             if !known_wrong(&bounds_path, violations) {
                 let within = Interval::from_to(lower, upper, "the bounds");
                 number(&start_path, start, within, violations);

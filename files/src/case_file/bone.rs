@@ -139,7 +139,7 @@ fn sublayer(reader: &mut Reader, table: &Table<'_>, model: &PorosityModel) -> Op
     if let Some(thickness) = thickness {
         let kind = PlausibleRange::known_of(Parameter::BoneThickness);
         let path = table.path(THICKNESS);
-        check::quantity(&path, thickness, accepted, &kind, &mut reader.violations);
+        check::quantity(&path, thickness, accepted, kind, &mut reader.violations);
     }
     let solid = solid(reader, table, model);
     Some(Sublayer { thickness: thickness?, solid: solid? })
@@ -153,7 +153,7 @@ fn whole_thickness(reader: &mut Reader, bone: &Table<'_>, sublayers: &Sublayers)
         return None;
     }
     let kind = PlausibleRange::known_of(Parameter::BoneThickness);
-    check::quantity(&path, thickness, Parameter::BoneThickness.row().accepted, &kind, &mut found);
+    check::quantity(&path, thickness, Parameter::BoneThickness.row().accepted, kind, &mut found);
     for violation in found.iter() {
         let message = format!("the thickness of all together {}", violation.message);
         reader.violations.add(&violation.field, message);
@@ -225,7 +225,7 @@ fn required(
     let path = table.path(key);
     if typed {
         let kind = PlausibleRange::known_of(parameter);
-        check::quantity(&path, value, accepted, &kind, &mut reader.violations);
+        check::quantity(&path, value, accepted, kind, &mut reader.violations);
     } else {
         check::number(&path, value, accepted, &mut reader.violations);
     }
