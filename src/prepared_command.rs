@@ -14,7 +14,7 @@ pub(crate) type Ended = Result<ExitStatus, CommandFailure>;
 pub(crate) struct PreparedCommand {
     performance: Pin<Box<dyn Future<Output = Ended>>>,
     left_by_interruption: Option<&'static str>,
-    /// Name under which its spans are exported.
+    /// Name of the process in exported traces.
     pub(crate) name: &'static str,
     /// Default log level.
     pub(crate) log_level: &'static str,
@@ -23,7 +23,7 @@ pub(crate) struct PreparedCommand {
 }
 
 impl PreparedCommand {
-    /// A command that treats interruptions itself. It logs problems only.
+    /// Creates a command that treats interruptions itself and logs problems only.
     pub(crate) fn new(performance: impl Future<Output = Ended> + 'static) -> Self {
         Self {
             performance: Box::pin(performance),
@@ -34,12 +34,13 @@ impl PreparedCommand {
         }
     }
 
-    /// A command that ends at once.
+    /// Creates a command that ends at once.
     pub(crate) fn brief(perform: impl FnOnce() -> Ended + 'static) -> Self {
         Self::new(async { perform() })
     }
 
-    /// A command that is interrupted at any moment, and what is said then of what it leaves behind.
+    /// Creates a command that may be interrupted at any moment; `left` is the message that then says what it leaves
+    /// behind.
     pub(crate) fn interruptible(
         left: &'static str,
         performance: impl Future<Output = Ended> + 'static,
@@ -47,12 +48,12 @@ impl PreparedCommand {
         Self { left_by_interruption: Some(left), ..Self::new(performance) }
     }
 
-    /// A command that is interrupted at any moment and changes nothing.
+    /// Creates a command that may be interrupted at any moment and changes nothing.
     pub(crate) fn harmless(performance: impl Future<Output = Ended> + 'static) -> Self {
         Self::interruptible("nothing was changed", performance)
     }
 
-    /// A service, which logs its events.
+    /// Creates a service, which logs its events.
     pub(crate) fn service(
         name: &'static str,
         log_format: LogFormat,
@@ -61,12 +62,12 @@ impl PreparedCommand {
         Self { name, log_format, ..Self::new(performance).with_events() }
     }
 
-    /// The same, which logs its events.
+    /// Returns the same command, which then logs its events.
     pub(crate) fn with_events(self) -> Self {
         Self { log_level: "info", ..self }
     }
 
-    /// Does it.
+    /// Executes the command.
     ///
     /// # Errors
     /// If the command fails, or was interrupted.

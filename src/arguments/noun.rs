@@ -3,8 +3,8 @@
 use clap::error::Error;
 use clap::{ArgMatches, Args, Command, FromArgMatches, Subcommand};
 
-/// What stands after such a word. `Args` can be derived only for options that are wanted beside a
-/// command, too.
+/// The arguments of such a word: the options of its service, or a command. It is written by hand because a derived
+/// `Args` cannot require options of the service that its commands do not have.
 #[derive(Debug)]
 pub(crate) enum Noun<S, C> {
     /// The options of the service.

@@ -1,4 +1,4 @@
-//! Rules on a porosity and on what it means.
+//! Rules on a porosity, and on the model by which density and elasticity are computed from it.
 
 use crate::plausible;
 use crate::porosity::{self, PorosityModel};

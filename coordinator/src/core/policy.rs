@@ -2,9 +2,8 @@
 //! compared. None of them changes a result: they decide how soon it is there, and how soon a broken machine is
 //! found.
 //!
-//! What those of speed are worth was measured by `cargo xtask bench fleet`, with each switched off in turn. The
-//! time of a job is then 1.6 times as long without `SHARE_DIVISOR` (30 workers, 0.1 ms realizations); with 1,000
-//! workers 2.1 times without `BATCH_COST_S`, 1.4 to 2.4 times without `RATED_WORKERS_MIN`, and 1.4 times without
+//! Each constant that affects speed was switched off in turn under `cargo xtask bench fleet`. A job then takes 1.6
+//! times as long without `SHARE_DIVISOR` (30 workers, 0.1 ms realizations); with 1,000 workers 2.1 times without `BATCH_COST_S`, 1.4 to 2.4 times without `RATED_WORKERS_MIN`, and 1.4 times without
 //! `MANY_WORKERS`; with groups 1.4 times without `BATCH_WORTH_S`. A search takes 1.1 to 1.3 times as long without
 //! speculation. The others bound what a fault, or an event, can cost.
 

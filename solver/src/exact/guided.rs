@@ -111,7 +111,7 @@ struct FreeBone {
     thickness: f64,
 }
 
-/// What counts the waves of a bone.
+/// Counts the guided waves of a bone below a frequency.
 enum WaveCounter {
     Plate { isa: Isa, plate: Box<(Medium, AccuratePlate)> },
     Stack(FreeStack),
