@@ -11,6 +11,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use thiserror::Error;
 
 use crate::elasticity::{Elasticity, NotElastic};
+use crate::setup_quantity::SetupQuantity;
 use crate::special::{GammaQuantile, root_gamma_moments, standard_normal_quantile};
 
 /// The dispersion must be below this, √((n+1)/(n+5)) = √(7/11) for n = 6: then the inverse of the
@@ -22,7 +23,7 @@ pub const GERMS: usize = 21;
 /// Number of further germs, for random quantities of the setup
 /// ([`crate::random_quantities`]). They follow those of the elasticity, which are the same with and
 /// without them.
-pub const SETUP_GERMS: usize = 4;
+pub const SETUP_GERMS: usize = SetupQuantity::ALL.len();
 
 /// Largest double below 1.
 const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;

@@ -10,6 +10,7 @@ use crate::accepted::Interval;
 use crate::elasticity::EngineeringConstants;
 use crate::ensemble::DISPERSION_MAX;
 use crate::limits::QUALITY_FACTOR_MIN;
+use crate::plausible::{self, PlausibleRange};
 
 /// Number of all parameters.
 pub const PARAMETERS: usize = BONE_PARAMETERS + 3;
@@ -63,6 +64,8 @@ pub struct ParameterRow {
     pub unit: &'static str,
     /// Values that are accepted, regardless of other fields.
     pub accepted: Interval,
+    /// The range of a physical value, and units that people write instead.
+    pub plausible: &'static PlausibleRange,
     /// The unit in which people read it, and what one of that is in the unit of files.
     pub shown_in: (&'static str, f64),
     /// Whether its intervals are those of its logarithm.
@@ -86,6 +89,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "ρ",
         unit: "kg/m³",
         accepted: Interval::above(0.0, "kg/m³"),
+        plausible: &plausible::DENSITY,
         shown_in: ("kg/m³", 1.0),
         scale: ParameterScale::Logarithmic,
     },
@@ -96,6 +100,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "e_L",
         unit: "Pa",
         accepted: Interval::above(0.0, "Pa"),
+        plausible: &plausible::MODULUS,
         shown_in: ("GPa", 1e9),
         scale: ParameterScale::Logarithmic,
     },
@@ -106,6 +111,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "ν_L",
         unit: "",
         accepted: Interval::finite(""),
+        plausible: &plausible::POISSON_RATIO,
         shown_in: ("", 1.0),
         scale: ParameterScale::Linear,
     },
@@ -116,6 +122,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "g_L",
         unit: "Pa",
         accepted: Interval::above(0.0, "Pa"),
+        plausible: &plausible::MODULUS,
         shown_in: ("GPa", 1e9),
         scale: ParameterScale::Logarithmic,
     },
@@ -126,6 +133,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "e_T",
         unit: "Pa",
         accepted: Interval::above(0.0, "Pa"),
+        plausible: &plausible::MODULUS,
         shown_in: ("GPa", 1e9),
         scale: ParameterScale::Logarithmic,
     },
@@ -136,6 +144,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "ν_T",
         unit: "",
         accepted: Interval::between(-1.0, 1.0, ""),
+        plausible: &plausible::POISSON_RATIO,
         shown_in: ("", 1.0),
         scale: ParameterScale::Linear,
     },
@@ -146,6 +155,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "δ",
         unit: "",
         accepted: Interval::between(0.0, DISPERSION_MAX, "that is √(7/11)"),
+        plausible: &plausible::DISPERSION,
         shown_in: ("", 1.0),
         scale: ParameterScale::Logarithmic,
     },
@@ -156,6 +166,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "h",
         unit: "m",
         accepted: Interval::above(0.0, "m"),
+        plausible: &plausible::BONE_THICKNESS,
         shown_in: ("mm", 1e-3),
         scale: ParameterScale::Logarithmic,
     },
@@ -166,6 +177,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "Q",
         unit: "",
         accepted: Interval::at_least(QUALITY_FACTOR_MIN, ""),
+        plausible: &plausible::QUALITY_FACTOR,
         shown_in: ("", 1.0),
         scale: ParameterScale::Logarithmic,
     },
@@ -176,6 +188,7 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         symbol: "c₁",
         unit: "m/s",
         accepted: Interval::above(0.0, "m/s"),
+        plausible: &plausible::SOUND_SPEED,
         shown_in: ("m/s", 1.0),
         scale: ParameterScale::Logarithmic,
     },

@@ -5,7 +5,6 @@
 //! unusual is accepted with a [warning](crate::warnings::Warning).
 
 use crate::accepted::Interval;
-use crate::parameters::Parameter;
 
 /// A unit that people use instead of the required one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,6 +165,7 @@ pub(crate) const MODULUS: PlausibleRange = PlausibleRange {
     possible: (1e6, f64::INFINITY),
     units: &[other("GPa", 9), other("MPa", 6)],
 };
+/// Poisson ratios.
 pub(crate) const POISSON_RATIO: PlausibleRange = PlausibleRange {
     unit: "",
     typical: 0.35,
@@ -181,7 +181,8 @@ pub(crate) const POROSITY: PlausibleRange = PlausibleRange {
     possible: (0.0, 1.0),
     units: PER_CENT,
 };
-const DISPERSION: PlausibleRange = PlausibleRange {
+/// Dispersion of the random elasticity.
+pub(crate) const DISPERSION: PlausibleRange = PlausibleRange {
     unit: "",
     typical: 0.1,
     usual: (2e-3, 0.7),
@@ -190,23 +191,6 @@ const DISPERSION: PlausibleRange = PlausibleRange {
 };
 
 impl PlausibleRange {
-    /// Returns the prior knowledge about a parameter.
-    pub fn known_of(parameter: Parameter) -> &'static Self {
-        match parameter {
-            Parameter::Density => &DENSITY,
-            Parameter::LongitudinalYoungModulus
-            | Parameter::LongitudinalShearModulus
-            | Parameter::TransverseYoungModulus => &MODULUS,
-            Parameter::LongitudinalPoissonRatio | Parameter::TransversePoissonRatio => {
-                &POISSON_RATIO
-            }
-            Parameter::Dispersion => &DISPERSION,
-            Parameter::BoneThickness => &BONE_THICKNESS,
-            Parameter::BoneQualityFactor => &QUALITY_FACTOR,
-            Parameter::CouplingSoundSpeed => &SOUND_SPEED,
-        }
-    }
-
     /// Returns whether such a value is physically impossible.
     pub(crate) fn is_impossible(&self, value: f64) -> bool {
         let (from, to) = self.possible;

@@ -8,7 +8,7 @@ use crate::elasticity::{EngineeringConstants, Inadmissible, NotElastic};
 use crate::fields::{self, Fields, Key, Number, Section};
 use crate::homogenisation::HillModuli;
 use crate::parameters::Parameter;
-use crate::plausible::{self, PlausibleRange};
+use crate::plausible;
 
 fields::choices!(Homogenisation);
 
@@ -179,7 +179,7 @@ impl Section for BoneMatrix {
                 _ => row.meaning,
             };
             let key = Key { name: row.name, meaning };
-            let number = Number::plausible(row.accepted, PlausibleRange::known_of(parameter));
+            let number = Number::plausible(row.accepted, parameter.row().plausible);
             fields.number(key, field, number);
         }
     }

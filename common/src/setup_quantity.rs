@@ -1,7 +1,6 @@
 //! Quantities of the setup that may be random, and those that may be searched.
 
 use crate::case::Setup;
-use crate::ensemble::SETUP_GERMS;
 use crate::parameters::{Parameter, Point};
 
 /// A quantity of the setup that may be random, or searched ([`Parameter::of_setup`]).
@@ -20,7 +19,7 @@ pub enum SetupQuantity {
 
 impl SetupQuantity {
     /// All quantities, in the order of their germs and of a user's file.
-    pub const ALL: [Self; SETUP_GERMS] =
+    pub const ALL: [Self; 4] =
         [Self::BoneThickness, Self::BoneQualityFactor, Self::CouplingSoundSpeed, Self::ProbeTilt];
 
     /// Returns the name used in files and messages.

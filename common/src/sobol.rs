@@ -1,12 +1,12 @@
 //! Scrambled Sobol' points for the germs.
 //!
 //! The sequence of I. M. Sobol' (USSR Comput. Math. Math. Phys. 7 (1967)) with the direction
-//! numbers of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30 (2008), 2635-2654), of which the first
-//! 25 dimensions are used: 21 for the elasticity, and four for random quantities of the setup. A
-//! scramble multiplies the digits of each coordinate by a random lower triangular matrix with a unit
-//! diagonal and adds a random shift (J. Matoušek, J. Complexity 14 (1998), 527-556). Every point is then uniform in the cube, every scramble is as evenly
-//! distributed as the sequence itself, and independent scrambles allow the error of their mean to
-//! be estimated.
+//! numbers of S. Joe and F. Y. Kuo (SIAM J. Sci. Comput. 30 (2008), 2635-2654): 21 dimensions are
+//! those of the elasticity, and the next ones those of random quantities of the setup. A scramble
+//! multiplies the digits of each coordinate by a random lower triangular matrix with a unit diagonal
+//! and adds a random shift (J. Matoušek, J. Complexity 14 (1998), 527-556). Every point is then uniform
+//! in the cube, every scramble is as evenly distributed as the sequence itself, and independent
+//! scrambles allow the error of their mean to be estimated.
 
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -20,9 +20,9 @@ const DIGITS: usize = 64;
 /// Bytes 8 to 12 of the key, so that no stream of independent germs equals that of a scramble.
 const KEY_MARK: [u8; 5] = *b"sobol";
 
-/// Primitive polynomials and initial direction numbers of dimensions 2 to 25: the degree, the inner
-/// coefficients as a binary number, and m₁, m₂, …
-const DIRECTIONS: [(u32, u32, &[u32]); GERMS + SETUP_GERMS - 1] = [
+/// Primitive polynomials and initial direction numbers of dimensions 2 to 32: the degree, the inner
+/// coefficients as a binary number, and m₁, m₂, … The last ones wait for more random quantities.
+const DIRECTIONS: [(u32, u32, &[u32]); 31] = [
     (1, 0, &[1]),
     (2, 1, &[1, 3]),
     (3, 1, &[1, 3, 1]),
@@ -47,7 +47,15 @@ const DIRECTIONS: [(u32, u32, &[u32]); GERMS + SETUP_GERMS - 1] = [
     (7, 8, &[1, 3, 5, 9, 1, 25, 53]),
     (7, 14, &[1, 3, 1, 13, 9, 35, 107]),
     (7, 19, &[1, 3, 1, 5, 27, 61, 31]),
+    (7, 21, &[1, 1, 5, 11, 19, 41, 61]),
+    (7, 28, &[1, 3, 5, 3, 3, 13, 69]),
+    (7, 31, &[1, 1, 7, 13, 1, 19, 1]),
+    (7, 32, &[1, 3, 7, 5, 13, 19, 59]),
+    (7, 37, &[1, 1, 3, 9, 25, 29, 41]),
+    (7, 41, &[1, 3, 5, 13, 23, 1, 55]),
+    (7, 42, &[1, 3, 7, 3, 13, 59, 17]),
 ];
+const _: () = assert!(GERMS + SETUP_GERMS <= DIRECTIONS.len() + 1);
 
 /// The germ, numbered by rows of L_G, for which each of the first 21 dimensions of the sequence is
 /// used. The earlier a dimension, the more evenly its points are distributed, and 11, 55, 33, 23, 22,
@@ -183,7 +191,7 @@ mod tests {
 
     #[test]
     fn direction_numbers_are_odd_and_fit_their_digit() {
-        for dimension in 0..GERMS + SETUP_GERMS {
+        for dimension in 0..=DIRECTIONS.len() {
             for (column, value) in directions(dimension).into_iter().enumerate() {
                 let m = value >> (DIGITS - 1 - column);
                 assert!(m % 2 == 1 && m < 2 << column, "{dimension} {column}: {m}");

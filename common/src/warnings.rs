@@ -141,13 +141,13 @@ impl Warnings {
             Range::Free { .. } => "start",
         };
         let field = format!("parameters.{}.{key}", parameter.name());
-        self.number(&field, range.start(), PlausibleRange::known_of(parameter));
+        self.number(&field, range.start(), parameter.row().plausible);
     }
 
     /// Names, for each quantity that is known of the groups, the first group whose value is unusual.
     fn known(&mut self, data: &Data) {
         for parameter in Parameter::OF_SETUP {
-            let range = PlausibleRange::known_of(parameter);
+            let range = parameter.row().plausible;
             let doubt = data.groups().iter().find_map(|group| {
                 let doubt = range.doubt(group.known.get(parameter)?)?;
                 Some(format!("that of the group {:?} {doubt}", group.name))

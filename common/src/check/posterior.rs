@@ -6,7 +6,6 @@ use crate::job::{
 };
 use crate::limits::DRAWS_ALL_MAX;
 use crate::parameters::Parameter;
-use crate::plausible::PlausibleRange;
 use crate::violations::Violations;
 
 use super::section::section;
@@ -101,7 +100,7 @@ fn prior(parameter: Parameter, law: PosteriorPrior, range: Range, violations: &m
     } else {
         (Interval::finite(unit), Interval::above(0.0, unit))
     };
-    quantity(&center_path, center, centers, PlausibleRange::known_of(parameter), violations);
+    quantity(&center_path, center, centers, parameter.row().plausible, violations);
     number(&spread_path, spread, spreads, violations);
     let Range::Free { lower, upper, .. } = range else {
         if !violations.has_at_or_below(&path) {

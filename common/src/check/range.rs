@@ -12,7 +12,7 @@ use super::value::{known_wrong, number, quantity};
 /// bounds.
 pub(super) fn range(parameter: Parameter, range: Range, violations: &mut Violations) {
     let path = format!("parameters.{}", parameter.name());
-    let (accepted, kind) = (parameter.row().accepted, PlausibleRange::known_of(parameter));
+    let (accepted, kind) = (parameter.row().accepted, parameter.row().plausible);
     match range {
         Range::Fixed(value) => {
             quantity(&format!("{path}.fixed"), value, accepted, kind, violations);

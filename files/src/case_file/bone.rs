@@ -7,7 +7,6 @@ use osteon_common::elasticity::{Elasticity, EngineeringConstants};
 use osteon_common::field_path::element_path;
 use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::parameters::Parameter;
-use osteon_common::plausible::PlausibleRange;
 use osteon_common::porosity::{POROSITY, PorosityModel};
 use osteon_common::setup_quantity::SetupQuantity;
 use osteon_common::violations::Violations;
@@ -137,7 +136,7 @@ fn sublayer(reader: &mut Reader, table: &Table<'_>, model: &PorosityModel) -> Op
     }
     let thickness = reader.number(table, THICKNESS);
     if let Some(thickness) = thickness {
-        let kind = PlausibleRange::known_of(Parameter::BoneThickness);
+        let kind = Parameter::BoneThickness.row().plausible;
         let path = table.path(THICKNESS);
         check::quantity(&path, thickness, accepted, kind, &mut reader.violations);
     }
@@ -152,7 +151,7 @@ fn whole_thickness(reader: &mut Reader, bone: &Table<'_>, sublayers: &Sublayers)
     if reader.violations.has_at_or_below(&path) {
         return None;
     }
-    let kind = PlausibleRange::known_of(Parameter::BoneThickness);
+    let kind = Parameter::BoneThickness.row().plausible;
     check::quantity(&path, thickness, Parameter::BoneThickness.row().accepted, kind, &mut found);
     for violation in found.iter() {
         let message = format!("the thickness of all together {}", violation.message);
@@ -224,7 +223,7 @@ fn required(
     let value = reader.number(table, key)?;
     let path = table.path(key);
     if typed {
-        let kind = PlausibleRange::known_of(parameter);
+        let kind = parameter.row().plausible;
         check::quantity(&path, value, accepted, kind, &mut reader.violations);
     } else {
         check::number(&path, value, accepted, &mut reader.violations);
