@@ -82,6 +82,15 @@ impl Interval {
         (self.lower, self.upper)
     }
 
+    /// Returns the limits, infinite where there is none.
+    pub fn limits(&self) -> [f64; 2] {
+        let limit = |edge, none| match edge {
+            Edge::None => none,
+            Edge::Open(limit) | Edge::Closed(limit) => limit,
+        };
+        [limit(self.lower, f64::NEG_INFINITY), limit(self.upper, f64::INFINITY)]
+    }
+
     /// Returns whether `value` is finite and inside the interval.
     pub fn contains(&self, value: f64) -> bool {
         let above = match self.lower {

@@ -72,7 +72,9 @@ impl AttainableMoments {
 fn velocities(ranges: &[Range; PARAMETERS], setup: &Setup) -> (f64, f64) {
     let (density, modulus) =
         (ends(ranges, Parameter::Density), ends(ranges, Parameter::LongitudinalYoungModulus));
-    let bar_velocity_min = (modulus.0 / density.1).sqrt();
+    // e_L is at least this part of that between the pores, and the density is not larger.
+    let solid = 1.0 - setup.pores.mean_porosity().unwrap_or(0.0);
+    let bar_velocity_min = (solid * modulus.0 / density.1).sqrt();
     let highest = highest_bulk_velocity_point(ranges);
     let bulk_velocity_max = match highest.and_then(|point| bulk_velocity(&point).ok()) {
         Some(velocity) if !is_near(setup) => libm::exp(velocity.logarithm),

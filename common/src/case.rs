@@ -3,6 +3,7 @@
 use crate::bone::CaseBone;
 use crate::fields::{Key, Section};
 use crate::layers::Layers;
+use crate::pores::Pores;
 use crate::probe::Probe;
 use crate::settings::{Picking, SolverSettings};
 
@@ -20,10 +21,14 @@ pub struct Setup {
     pub picking: Picking,
     /// Settings of the wave solver.
     pub solver: SolverSettings,
+    /// Pores of the bone, if this is the setup of a job whose bone follows from a porosity. A solver is
+    /// given a bone and ignores them.
+    pub pores: Pores,
 }
 
 impl Setup {
-    /// Returns each section with its key, in the order of a canonical file.
+    /// Returns each section with its key, in the order of a canonical file, but for the bone's: it is that
+    /// of a job or of a case.
     pub fn sections(&mut self) -> [(Key, &mut dyn Section); 4] {
         [
             (Key { name: "layers", meaning: "the three layers" }, &mut self.layers),

@@ -7,6 +7,7 @@ mod data;
 mod job;
 mod known_quantities;
 mod observables;
+mod pores;
 mod porosity;
 mod posterior;
 mod priors;
@@ -22,6 +23,7 @@ use crate::violations::Violations;
 
 pub use self::data::{COUNT, DATA_FORMS, REPEATABILITY, VELOCITIES_MIN, VELOCITY, data, no_data};
 pub use self::job::{job, job_from};
+pub use self::pores::porosity_profile;
 pub use self::porosity::{porosity, porosity_model};
 pub use self::posterior::posterior;
 pub use self::random_quantities::random_quantities;

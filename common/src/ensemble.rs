@@ -11,7 +11,6 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use thiserror::Error;
 
 use crate::elasticity::{Elasticity, NotElastic};
-use crate::setup_quantity::SetupQuantity;
 use crate::special::{GammaQuantile, root_gamma_moments, standard_normal_quantile};
 
 /// The dispersion must be below this, √((n+1)/(n+5)) = √(7/11) for n = 6: then the inverse of the
@@ -20,11 +19,6 @@ pub const DISPERSION_MAX: f64 = 0.797_724_035_217_465_6;
 
 /// Number of germs of one realization's elasticity: the entries of a triangular 6×6 matrix.
 pub const GERMS: usize = 21;
-/// Number of further germs, for random quantities of the setup
-/// ([`crate::random_quantities`]). They follow those of the elasticity, which are the same with and
-/// without them.
-pub const SETUP_GERMS: usize = SetupQuantity::ALL.len();
-
 /// Largest double below 1.
 const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
 
@@ -79,8 +73,8 @@ impl Germs {
         uniform(stream(seed, index).next_u64())
     }
 
-    /// Returns the germs that follow those of [`Germs::draw`].
-    pub(crate) fn of_setup(seed: u64, index: u64) -> [f64; SETUP_GERMS] {
+    /// Returns the germs that follow those of [`Germs::draw`]: those of the realization's setup.
+    pub(crate) fn of_setup<const COUNT: usize>(seed: u64, index: u64) -> [f64; COUNT] {
         let mut rng = stream(seed, index);
         // ChaCha20 counts words of 32 bits.
         rng.set_word_pos(2 * GERMS as u128);
@@ -146,20 +140,17 @@ impl ElasticityLaw {
     /// If rounding destroys positive definiteness: for germs at the very edge of (0, 1) at a large
     /// dispersion, or for a mean that is itself nearly singular.
     pub fn realize(&self, germs: &Germs) -> Result<Elasticity, NotElastic> {
-        // [C] = [M]ᵀ [M] with [M] = [L_G] [L], upper triangular.
-        let m = multiply_triangular(&self.triangle(germs), &self.factor);
-        let mut c = [[0.0; 6]; 6];
-        for i in 0..6 {
-            for j in i..6 {
-                let mut sum = 0.0;
-                for row in m.iter().take(i + 1) {
-                    sum = row[i].mul_add(row[j], sum);
-                }
-                c[i][j] = sum;
-                c[j][i] = sum;
-            }
-        }
-        Elasticity::new(c)
+        realize(&self.triangle(germs), &self.factor)
+    }
+
+    /// Returns the realizations for these germs of laws with the same dispersion and other means: `[G]` is
+    /// that of [`ElasticityLaw::realize`] for all of them.
+    pub fn realize_about(
+        &self,
+        germs: &Germs,
+    ) -> impl Fn(&Elasticity) -> Result<Elasticity, NotElastic> + use<> {
+        let triangle = self.triangle(germs);
+        move |mean| realize(&triangle, &mean.cholesky())
     }
 
     /// Returns c1111 = C11, Pa, of the realization whose germ of entry 11 is `germ`. As [L] and
@@ -200,6 +191,24 @@ impl Diagonal {
     fn entry(&self, germ: f64) -> f64 {
         (self.mean_square * self.gamma.relative_quantile(germ)).sqrt()
     }
+}
+
+/// Returns `[C]` for a triangle `[L_G]` and the factor `[L]` of a mean.
+fn realize(triangle: &[[f64; 6]; 6], factor: &[[f64; 6]; 6]) -> Result<Elasticity, NotElastic> {
+    // [C] = [M]ᵀ [M] with [M] = [L_G] [L], upper triangular.
+    let m = multiply_triangular(triangle, factor);
+    let mut c = [[0.0; 6]; 6];
+    for i in 0..6 {
+        for j in i..6 {
+            let mut sum = 0.0;
+            for row in m.iter().take(i + 1) {
+                sum = row[i].mul_add(row[j], sum);
+            }
+            c[i][j] = sum;
+            c[j][i] = sum;
+        }
+    }
+    Elasticity::new(c)
 }
 
 /// Multiplies two upper triangular matrices; sums run in ascending order of the inner index.
@@ -330,9 +339,9 @@ mod tests {
     #[test]
     fn setup_germs_continue_the_stream() {
         let mut rng = stream(5, 17);
-        let all: Vec<f64> = (0..GERMS + SETUP_GERMS).map(|_| uniform(rng.next_u64())).collect();
+        let all: Vec<f64> = (0..GERMS + 4).map(|_| uniform(rng.next_u64())).collect();
         assert_eq!(all[..GERMS], *Germs::draw(5, 17).values());
-        assert_eq!(all[GERMS..], Germs::of_setup(5, 17));
+        assert_eq!(all[GERMS..], Germs::of_setup::<4>(5, 17));
     }
 
     #[test]

@@ -2,7 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::ensemble::{GERMS, Germs, SETUP_GERMS, uniform};
+use crate::ensemble::{GERMS, Germs, uniform};
+use crate::setup_quantity::SETUP_GERMS;
 use crate::sobol::{Scramble, ScrambledDimensions};
 
 /// Everything that determines the germs at every index.

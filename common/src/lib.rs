@@ -44,6 +44,7 @@ pub mod outcome;
 pub mod outcomes;
 pub mod parameters;
 pub mod plausible;
+pub mod pores;
 pub mod porosity;
 pub mod posterior;
 mod posterior_settings;

@@ -13,12 +13,15 @@ use crate::limits::QUALITY_FACTOR_MIN;
 use crate::plausible::{self, PlausibleRange};
 
 /// Number of all parameters.
-pub const PARAMETERS: usize = BONE_PARAMETERS + 3;
+pub const PARAMETERS: usize = BONE_PARAMETERS + 6;
 /// Number of the parameters that every job has.
 pub const BONE_PARAMETERS: usize = 7;
 /// The number that stands in a point for a parameter of the setup that is not searched: the setup's
 /// value holds. All valid values are above it.
 pub const AS_IN_SETUP: f64 = 0.0;
+
+/// The porosities of a job's bone: without pores there is no such parameter.
+const POROSITY: Interval = Interval::between(0.0, 0.5, "of the volume");
 
 /// One of the parameters. The order of the variants is the order of the columns of `history.csv`, of
 /// the digest and of every vector of numbers of all parameters.
@@ -41,6 +44,12 @@ pub enum Parameter {
     TransversePoissonRatio,
     /// Dispersion δ of the random elasticity.
     Dispersion,
+    /// Porosity of the bone, the same through its thickness.
+    Porosity,
+    /// Porosity at the skin's side of the bone.
+    SurfacePorosity,
+    /// Porosity at the marrow's side of the bone.
+    MarrowPorosity,
     /// Thickness of the bone, m.
     BoneThickness,
     /// Quality factor of the bone.
@@ -160,6 +169,39 @@ const ROWS: [ParameterRow; PARAMETERS] = [
         scale: ParameterScale::Logarithmic,
     },
     ParameterRow {
+        name: "porosity",
+        meaning: "porosity of the bone",
+        title: "porosity",
+        symbol: "φ",
+        unit: "",
+        accepted: POROSITY,
+        plausible: &plausible::POROSITY,
+        shown_in: ("", 1.0),
+        scale: ParameterScale::Linear,
+    },
+    ParameterRow {
+        name: "surface_porosity",
+        meaning: "porosity at the skin's side of the bone",
+        title: "porosity at the skin's side",
+        symbol: "φ_s",
+        unit: "",
+        accepted: POROSITY,
+        plausible: &plausible::POROSITY,
+        shown_in: ("", 1.0),
+        scale: ParameterScale::Linear,
+    },
+    ParameterRow {
+        name: "marrow_porosity",
+        meaning: "porosity at the marrow's side of the bone",
+        title: "porosity at the marrow's side",
+        symbol: "φ_m",
+        unit: "",
+        accepted: POROSITY,
+        plausible: &plausible::POROSITY,
+        shown_in: ("", 1.0),
+        scale: ParameterScale::Linear,
+    },
+    ParameterRow {
         name: "bone_thickness",
         meaning: "thickness of the bone",
         title: "bone thickness",
@@ -204,6 +246,9 @@ impl Parameter {
         Self::TransverseYoungModulus,
         Self::TransversePoissonRatio,
         Self::Dispersion,
+        Self::Porosity,
+        Self::SurfacePorosity,
+        Self::MarrowPorosity,
         Self::BoneThickness,
         Self::BoneQualityFactor,
         Self::CouplingSoundSpeed,
@@ -274,11 +319,13 @@ impl Point {
     /// Returns the parameters that the point has, with their values: all of the bone, and those of the
     /// setup that are searched.
     pub fn given(&self) -> impl Iterator<Item = (Parameter, f64)> + '_ {
-        let of = |parameter: Parameter| (parameter, self.get(parameter));
-        let has = |(parameter, value): &(Parameter, f64)| {
-            (*parameter as usize) < BONE_PARAMETERS || *value != AS_IN_SETUP
-        };
-        Parameter::ALL.into_iter().map(of).filter(has)
+        let given = Parameter::ALL.into_iter().filter(|parameter| self.has(*parameter));
+        given.map(|parameter| (parameter, self.get(parameter)))
+    }
+
+    /// Returns whether the point has this parameter.
+    pub fn has(&self, parameter: Parameter) -> bool {
+        (parameter as usize) < BONE_PARAMETERS || self.get(parameter) != AS_IN_SETUP
     }
 
     /// Returns the value of one parameter.

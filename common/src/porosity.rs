@@ -7,7 +7,7 @@ use crate::case::Bone;
 use crate::elasticity::{EngineeringConstants, Inadmissible, NotElastic};
 use crate::fields::{self, Fields, Key, Number, Section};
 use crate::homogenisation::HillModuli;
-use crate::parameters::Parameter;
+use crate::parameters::{Parameter, Point};
 use crate::plausible;
 
 fields::choices!(Homogenisation);
@@ -53,15 +53,43 @@ pub struct BoneMatrix {
     pub constants: EngineeringConstants,
 }
 
+impl Point {
+    /// Creates a point with this mean model and dispersion.
+    pub const fn of_matrix(matrix: &BoneMatrix, dispersion: f64) -> Self {
+        let constants = &matrix.constants;
+        Self::of_bone([
+            matrix.density,
+            constants.longitudinal_young_modulus,
+            constants.longitudinal_poisson_ratio,
+            constants.longitudinal_shear_modulus,
+            constants.transverse_young_modulus,
+            constants.transverse_poisson_ratio,
+            dispersion,
+        ])
+    }
+
+    /// Returns the mean model: the whole bone, or where it has pores, what is between them.
+    pub fn mean_model(&self) -> BoneMatrix {
+        BoneMatrix { density: self.density(), constants: self.constants() }
+    }
+}
+
 /// How density and elasticity are computed from a porosity.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PorosityModel {
     /// The estimate.
     pub homogenisation: Homogenisation,
+    /// The fluid in the pores.
+    pub fluid: PoreFluid,
+}
+
+/// The table of a case file by which its porosities are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CasePorosityModel {
+    /// How density and elasticity follow.
+    pub model: PorosityModel,
     /// The bone between the pores.
     pub matrix: BoneMatrix,
-    /// The fluid in them.
-    pub fluid: PoreFluid,
 }
 
 /// Reason why a porosity has no bone.
@@ -79,6 +107,12 @@ pub enum NoPorousBone {
     /// The estimate is no elasticity, by rounding.
     #[error("the estimate is no elasticity: {0}")]
     NotElastic(#[from] NotElastic),
+    /// A profile has no sublayers, or too many.
+    #[error("the profile has {count} sublayers")]
+    Sublayers {
+        /// Their number.
+        count: usize,
+    },
 }
 
 impl Homogenisation {
@@ -126,21 +160,35 @@ impl PorosityModel {
                   along the bone, filled with a fluid ([physics.md](physics.md#porosity))",
     };
 
-    /// Returns the bone of this porosity.
+    /// Returns the bone that a matrix with this porosity is.
     ///
     /// # Errors
     /// If the matrix is not admissible, or if the estimate has no stiffness.
-    pub fn bone(&self, porosity: f64) -> Result<Bone, NoPorousBone> {
-        let matrix = HillModuli::from_elasticity(&self.matrix.constants.elasticity()?);
+    pub fn bone(&self, matrix: &BoneMatrix, porosity: f64) -> Result<Bone, NoPorousBone> {
+        let solid = HillModuli::from_elasticity(&matrix.bone()?.elasticity);
         let fluid = self.fluid.bulk_modulus;
         let moduli = match self.homogenisation {
-            Homogenisation::MoriTanaka => matrix.mori_tanaka(fluid, porosity),
+            Homogenisation::MoriTanaka => solid.mori_tanaka(fluid, porosity),
             Homogenisation::SelfConsistent => {
-                matrix.self_consistent(fluid, porosity).ok_or(NoPorousBone::NoShear)?
+                solid.self_consistent(fluid, porosity).ok_or(NoPorousBone::NoShear)?
             }
         };
-        let density = (1.0 - porosity) * self.matrix.density + porosity * self.fluid.density;
+        let density = (1.0 - porosity) * matrix.density + porosity * self.fluid.density;
         Ok(Bone { density, elasticity: moduli.elasticity()? })
+    }
+}
+
+impl BoneMatrix {
+    /// Returns the bone without pores.
+    ///
+    /// # Errors
+    /// If density or constants are not admissible.
+    pub fn bone(&self) -> Result<Bone, Inadmissible> {
+        let Self { density, constants } = *self;
+        if !(density > 0.0 && density.is_finite()) {
+            return Err(Inadmissible::NotPositive { name: "density", value: density });
+        }
+        Ok(Bone { density, elasticity: constants.elasticity()? })
     }
 }
 
@@ -149,14 +197,20 @@ impl Section for PorosityModel {
         let estimate = "`\"mori_tanaka\"`: around the pores is the matrix; `\"self_consistent\"`: around \
                         them is the porous bone, whose stiffness falls faster";
         fields.choice(Key { name: "homogenisation", meaning: estimate }, &mut self.homogenisation);
+        let fluid = "the fluid in the pores, without viscosity";
+        fields.table(Key { name: "fluid", meaning: fluid }, &mut |fields| {
+            self.fluid.declare(fields);
+        });
+    }
+}
+
+impl Section for CasePorosityModel {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        self.model.declare(fields);
         let matrix = "the bone between the pores: its constants must be \
                       [admissible](physics.md#elasticity) together";
         fields.table(Key { name: "matrix", meaning: matrix }, &mut |fields| {
             self.matrix.declare(fields);
-        });
-        let fluid = "the fluid in the pores, without viscosity";
-        fields.table(Key { name: "fluid", meaning: fluid }, &mut |fields| {
-            self.fluid.declare(fields);
         });
     }
 }

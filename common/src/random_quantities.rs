@@ -7,9 +7,8 @@
 
 use crate::accepted::Interval;
 use crate::case::Setup;
-use crate::ensemble::SETUP_GERMS;
 use crate::fields::{self, Condition, Fields, Key, Number, Section};
-use crate::setup_quantity::SetupQuantity;
+use crate::setup_quantity::{SETUP_GERMS, SetupQuantity};
 use crate::special::standard_normal_quantile;
 
 fields::choices!(RandomDistribution);
@@ -52,6 +51,12 @@ pub struct RandomQuantities {
     pub coupling_sound_speed: Scatter,
     /// Scatter of the probe's tilt, rad.
     pub probe_tilt: Scatter,
+    /// Scatter of the porosity.
+    pub porosity: Scatter,
+    /// Scatter of the porosity at the skin's side.
+    pub surface_porosity: Scatter,
+    /// Scatter of the porosity at the marrow's side.
+    pub marrow_porosity: Scatter,
 }
 
 impl RandomDistribution {
@@ -106,6 +111,9 @@ impl RandomQuantities {
             SetupQuantity::BoneQualityFactor => self.bone_quality_factor,
             SetupQuantity::CouplingSoundSpeed => self.coupling_sound_speed,
             SetupQuantity::ProbeTilt => self.probe_tilt,
+            SetupQuantity::Porosity => self.porosity,
+            SetupQuantity::SurfacePorosity => self.surface_porosity,
+            SetupQuantity::MarrowPorosity => self.marrow_porosity,
         }
     }
 
@@ -147,6 +155,12 @@ impl Section for RandomQuantities {
         table(fields, "coupling_sound_speed", meaning, &mut self.coupling_sound_speed, "m/s");
         let meaning = "scatter of the probe's tilt about `probe.tilt`";
         table(fields, "probe_tilt", meaning, &mut self.probe_tilt, "rad");
+        let meaning = "scatter of the porosity about `bone.porosity`, which must be given";
+        table(fields, "porosity", meaning, &mut self.porosity, "");
+        let meaning = "scatter of the porosity at the skin's side about `bone.porosity.surface`";
+        table(fields, "surface_porosity", meaning, &mut self.surface_porosity, "");
+        let meaning = "scatter of the porosity at the marrow's side about `bone.porosity.marrow`";
+        table(fields, "marrow_porosity", meaning, &mut self.marrow_porosity, "");
     }
 }
 

@@ -2,11 +2,13 @@
 
 use thiserror::Error;
 
+use crate::bone::CaseBone;
 use crate::case::{Bone, Setup};
 use crate::elasticity::{Inadmissible, NotElastic};
 use crate::ensemble::{ElasticityLaw, LawError};
 use crate::germ_source::{GermMaker, GermSource};
 use crate::parameters::Point;
+use crate::porosity::NoPorousBone;
 use crate::random_quantities::RandomQuantities;
 
 /// The realizations of one point of the search: everything that determines the material at each index,
@@ -33,6 +35,26 @@ pub enum PointError {
     Law(#[from] LawError),
 }
 
+/// One realization: the setup and the bone that a solver is given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Realization {
+    /// The setup, if it is not the one that was given.
+    pub own_setup: Option<Setup>,
+    /// The bone.
+    pub bone: CaseBone,
+}
+
+/// Reason why a realization has no bone.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum NoBone {
+    /// The drawn matrix is no elasticity.
+    #[error(transparent)]
+    NotElastic(#[from] NotElastic),
+    /// The mean bone does not exist with the pores of this realization.
+    #[error("is not defined: {0}")]
+    Pores(#[from] NoPorousBone),
+}
+
 impl Ensemble {
     /// Creates the ensemble at a point, with independent germs of this seed.
     ///
@@ -47,12 +69,8 @@ impl Ensemble {
     /// # Errors
     /// The first violated condition: density, constants of the mean model, dispersion.
     pub fn drawn(point: &Point, germs: GermSource) -> Result<Self, PointError> {
-        let density = point.density();
-        if !(density > 0.0 && density.is_finite()) {
-            return Err(Inadmissible::NotPositive { name: "density", value: density }.into());
-        }
-        let mean = point.constants().elasticity()?;
-        let law = ElasticityLaw::new(&mean, point.dispersion())?;
+        let mean = point.mean_model().bone()?;
+        let law = ElasticityLaw::new(&mean.elasticity, point.dispersion())?;
         let (germs, random) = (GermMaker::new(germs), RandomQuantities::default());
         Ok(Self { point: *point, law, germs, random })
     }
@@ -78,7 +96,29 @@ impl Ensemble {
         self.own_setup(index, setup).unwrap_or(*setup)
     }
 
-    /// Returns the bone at `index`.
+    /// Returns the realization at `index`, given the setup of the job or that of its point.
+    ///
+    /// All sublayers of a bone have the same `[G]`: the bone is stiffer or softer than its mean throughout.
+    ///
+    /// # Errors
+    /// If the drawn matrix is not positive definite within rounding (see
+    /// [`ElasticityLaw::realize`]), or if there is no mean bone with the pores of this realization.
+    pub fn realization(&self, index: u64, setup: &Setup) -> Result<Realization, NoBone> {
+        let own_setup = self.own_setup(index, setup);
+        let Setup { pores, layers, .. } = own_setup.as_ref().unwrap_or(setup);
+        if !pores.is_any() {
+            return Ok(Realization { own_setup, bone: self.bone(index)?.into() });
+        }
+        let matrix = self.point.mean_model();
+        let realize = self.law.realize_about(&self.germs.germs(index));
+        let realized = |mean: Bone| -> Result<Bone, NoBone> {
+            Ok(Bone { elasticity: realize(&mean.elasticity)?, ..mean })
+        };
+        let bone = pores.bone(&matrix, layers.bone_thickness, realized)?;
+        Ok(Realization { own_setup, bone })
+    }
+
+    /// Returns the bone at `index` of a setup without pores.
     ///
     /// # Errors
     /// If the drawn matrix is not positive definite within rounding (see

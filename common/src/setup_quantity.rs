@@ -3,6 +3,10 @@
 use crate::case::Setup;
 use crate::parameters::{Parameter, Point};
 
+/// Number of germs of a realization's setup ([`crate::random_quantities`]). They follow those of the
+/// elasticity, which are the same with and without them.
+pub const SETUP_GERMS: usize = SetupQuantity::ALL.len();
+
 /// A quantity of the setup that may be random, or searched ([`Parameter::of_setup`]).
 /// The order of the variants is that of the germs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,12 +19,25 @@ pub enum SetupQuantity {
     CouplingSoundSpeed,
     /// Tilt of the probe, rad.
     ProbeTilt,
+    /// Porosity of the bone, the same through its thickness.
+    Porosity,
+    /// Porosity at the skin's side of the bone.
+    SurfacePorosity,
+    /// Porosity at the marrow's side of the bone.
+    MarrowPorosity,
 }
 
 impl SetupQuantity {
     /// All quantities, in the order of their germs and of a user's file.
-    pub const ALL: [Self; 4] =
-        [Self::BoneThickness, Self::BoneQualityFactor, Self::CouplingSoundSpeed, Self::ProbeTilt];
+    pub const ALL: [Self; 7] = [
+        Self::BoneThickness,
+        Self::BoneQualityFactor,
+        Self::CouplingSoundSpeed,
+        Self::ProbeTilt,
+        Self::Porosity,
+        Self::SurfacePorosity,
+        Self::MarrowPorosity,
+    ];
 
     /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
@@ -29,6 +46,9 @@ impl SetupQuantity {
             Self::BoneQualityFactor => "bone_quality_factor",
             Self::CouplingSoundSpeed => "coupling_sound_speed",
             Self::ProbeTilt => "probe_tilt",
+            Self::Porosity => "porosity",
+            Self::SurfacePorosity => "surface_porosity",
+            Self::MarrowPorosity => "marrow_porosity",
         }
     }
 
@@ -39,6 +59,9 @@ impl SetupQuantity {
             Self::BoneQualityFactor => "layers.bone.attenuation.quality_factor",
             Self::CouplingSoundSpeed => "layers.coupling.sound_speed",
             Self::ProbeTilt => "probe.tilt",
+            Self::Porosity => "bone.porosity",
+            Self::SurfacePorosity => "bone.porosity.surface",
+            Self::MarrowPorosity => "bone.porosity.marrow",
         }
     }
 
@@ -46,7 +69,10 @@ impl SetupQuantity {
     pub fn unit(self) -> &'static str {
         match self {
             Self::BoneThickness => "m",
-            Self::BoneQualityFactor => "",
+            Self::BoneQualityFactor
+            | Self::Porosity
+            | Self::SurfacePorosity
+            | Self::MarrowPorosity => "",
             Self::CouplingSoundSpeed => "m/s",
             Self::ProbeTilt => "rad",
         }
@@ -59,6 +85,9 @@ impl SetupQuantity {
             Self::BoneQualityFactor => setup.layers.bone_attenuation.quality_factor,
             Self::CouplingSoundSpeed => Some(setup.layers.coupling.sound_speed),
             Self::ProbeTilt => Some(setup.probe.tilt),
+            Self::Porosity => setup.pores.porosity,
+            Self::SurfacePorosity => setup.pores.profile.surface,
+            Self::MarrowPorosity => setup.pores.profile.marrow,
         }
     }
 
@@ -70,6 +99,9 @@ impl SetupQuantity {
             Self::BoneQualityFactor => setup.layers.bone_attenuation.quality_factor = Some(value),
             Self::CouplingSoundSpeed => setup.layers.coupling.sound_speed = value,
             Self::ProbeTilt => setup.probe.tilt = value,
+            Self::Porosity => setup.pores.porosity = Some(value),
+            Self::SurfacePorosity => setup.pores.profile.surface = Some(value),
+            Self::MarrowPorosity => setup.pores.profile.marrow = Some(value),
         }
         setup
     }
@@ -82,6 +114,9 @@ impl Parameter {
             Self::BoneThickness => Some(SetupQuantity::BoneThickness),
             Self::BoneQualityFactor => Some(SetupQuantity::BoneQualityFactor),
             Self::CouplingSoundSpeed => Some(SetupQuantity::CouplingSoundSpeed),
+            Self::Porosity => Some(SetupQuantity::Porosity),
+            Self::SurfacePorosity => Some(SetupQuantity::SurfacePorosity),
+            Self::MarrowPorosity => Some(SetupQuantity::MarrowPorosity),
             _ => None,
         }
     }

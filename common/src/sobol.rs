@@ -11,7 +11,8 @@
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use crate::ensemble::{GERMS, SETUP_GERMS};
+use crate::ensemble::GERMS;
+use crate::setup_quantity::SETUP_GERMS;
 
 /// Binary digits of an index: [`crate::limits::REALIZATIONS_MAX`] is below 2²⁴.
 const INDEX_DIGITS: usize = 24;

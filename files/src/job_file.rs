@@ -18,6 +18,7 @@ use osteon_common::job::{
     JobKind, JobSpecification, MonteCarlo, Objective, Omitted, PosteriorSettings, Search,
 };
 use osteon_common::limits;
+use osteon_common::pores::Pores;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::warnings::{self, Warning};
 
@@ -25,6 +26,7 @@ use crate::document::{Format, Node};
 use crate::document_text::DocumentText;
 use crate::file_error::{Bound, ContentError, FileError, Invalid};
 use crate::input_file::InputFile;
+use crate::pores;
 use crate::reader::{self, Reader, Table};
 use crate::setting::Setting;
 
@@ -136,6 +138,7 @@ fn of_tree(
         "probe",
         "picking",
         "solver",
+        Pores::KEY.name,
         "data",
         "parameters",
         "random",
@@ -148,7 +151,7 @@ fn of_tree(
     if !table.is_table() {
         return Err(reader.refuse(document, root));
     }
-    let setup = setup(&mut reader, &table);
+    let setup = Setup { pores: pores::of_job(&mut reader, &table), ..setup(&mut reader, &table) };
     let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
     let posterior = posterior::read(&mut reader, &table);
     let (objective, objective_omitted) = objective(&mut reader, &table);

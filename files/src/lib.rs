@@ -18,6 +18,7 @@ pub mod init;
 pub mod input_file;
 pub mod job_file;
 pub mod materials;
+mod pores;
 pub mod posterior_csv;
 mod reader;
 pub mod report;

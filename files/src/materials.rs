@@ -7,7 +7,8 @@ use std::sync::LazyLock;
 
 use osteon_common::elasticity::EngineeringConstants;
 use osteon_common::field_path::quoted;
-use osteon_common::parameters::Parameter;
+use osteon_common::parameters::{Parameter, Point};
+use osteon_common::porosity::BoneMatrix;
 use serde::Deserialize;
 
 use crate::document::Value;
@@ -128,6 +129,8 @@ pub(crate) enum Base {
     Unknown,
     /// It names this one.
     Known(&'static Material),
+    /// It names none, and belongs to a bone with pores: the default is what lies between them.
+    Matrix,
 }
 
 impl Base {
@@ -156,6 +159,8 @@ impl Base {
             Self::None => None,
             Self::Unknown => all().first()?.1.value(parameter),
             Self::Known(material) => material.value(parameter),
+            Self::Matrix if parameter == Parameter::Dispersion => None,
+            Self::Matrix => Some(Point::of_matrix(&BoneMatrix::default(), 0.0).get(parameter)),
         }
     }
 }

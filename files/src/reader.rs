@@ -72,6 +72,11 @@ impl<'a> Table<'a> {
     pub(crate) fn has(&self, key: &str) -> bool {
         self.get(key).is_some()
     }
+
+    /// Returns whether a key is there, and is a table.
+    pub(crate) fn holds_table(&self, key: &str) -> bool {
+        self.get(key).is_some_and(|node| matches!(node.value, Value::Table(_)))
+    }
 }
 
 impl Reader {

@@ -13,6 +13,8 @@ use osteon_common::job::{
 };
 use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::Parameter;
+use osteon_common::pores::Pores;
+use osteon_common::porosity::{POROSITY, PorosityModel};
 use osteon_common::setup_quantity::SetupQuantity;
 
 /// Number of velocities per line of an inlined data set.
@@ -47,6 +49,7 @@ pub fn case(case: &Case) -> String {
 pub fn job(specification: &JobSpecification) -> String {
     written(|out| {
         setup(out, &specification.setup, &[])?;
+        pores(out, &specification.setup.pores)?;
         if let Some(given) = &specification.data {
             data(out, given)?;
         }
@@ -74,6 +77,25 @@ fn setup(out: &mut String, setup: &Setup, left_out: &[&str]) -> fmt::Result {
         let mut entries = entries(declared);
         leave_out(&mut entries, key.name, left_out);
         write_entries(out, key, &entries)?;
+    }
+    Ok(())
+}
+
+/// Writes the section of a job's pores, if there are any.
+fn pores(out: &mut String, pores: &Pores) -> fmt::Result {
+    if !pores.is_any() {
+        return Ok(());
+    }
+    let (mut profile, mut model) = (pores.profile, pores.model);
+    let porosity = match pores.porosity {
+        Some(porosity) => Some(format!("{porosity:?}")),
+        None => inline_table(&entries(&mut profile)),
+    };
+    writeln!(out, "\n[{}]", Pores::KEY.name)?;
+    for (key, text) in
+        [(POROSITY, porosity), (PorosityModel::KEY, inline_table(&entries(&mut model)))]
+    {
+        writeln!(out, "{} = {}", key.name, text.unwrap_or_default())?;
     }
     Ok(())
 }

@@ -112,6 +112,9 @@ pub static PARAMETER: EnumMapping<Parameter, v1::Parameter> = EnumMapping {
         Parameter::BoneThickness => v1::Parameter::BoneThickness,
         Parameter::BoneQualityFactor => v1::Parameter::BoneQualityFactor,
         Parameter::CouplingSoundSpeed => v1::Parameter::CouplingSoundSpeed,
+        Parameter::Porosity => v1::Parameter::Porosity,
+        Parameter::SurfacePorosity => v1::Parameter::SurfacePorosity,
+        Parameter::MarrowPorosity => v1::Parameter::MarrowPorosity,
     },
     name: v1::Parameter::as_str_name,
 };

@@ -37,7 +37,8 @@ pub struct EvaluationInput {
 
 /// Returns the message of an evaluation.
 pub fn to_message(evaluation: &EvaluationInput) -> v1::Evaluation {
-    let SetupMessages { layers, probe, picking, solver } = setup::to_messages(&evaluation.setup);
+    let SetupMessages { layers, probe, picking, solver, bone } =
+        setup::to_messages(&evaluation.setup);
     let (sampling, points) = match evaluation.germs.scheme {
         GermScheme::Streams => (Sampling::MonteCarlo, None),
         GermScheme::Sobol { points } => (Sampling::Sobol, Some(points)),
@@ -48,6 +49,7 @@ pub fn to_message(evaluation: &EvaluationInput) -> v1::Evaluation {
         probe: Some(probe),
         picking: Some(picking),
         solver: Some(solver),
+        bone,
         point: Some(point_to_message(&evaluation.point)),
         seed: evaluation.germs.seed,
         sampling: SAMPLING.number(sampling),
@@ -108,8 +110,15 @@ fn read_setup(message: &v1::Evaluation, violations: &mut Violations) -> Result<S
     else {
         return Err(Malformed::IncompleteSetup);
     };
-    let setup =
-        setup::from_messages(Some(layers), Some(probe), Some(picking), Some(solver), violations);
+    let bone = message.bone.as_ref();
+    let setup = setup::from_messages(
+        Some(layers),
+        Some(probe),
+        Some(picking),
+        Some(solver),
+        bone,
+        violations,
+    );
     check::setup(&setup, violations);
     if !violations.is_empty() {
         return Ok(setup);
@@ -118,7 +127,8 @@ fn read_setup(message: &v1::Evaluation, violations: &mut Violations) -> Result<S
     let complete = written.layers == *layers
         && written.probe == *probe
         && written.picking == *picking
-        && written.solver == *solver;
+        && written.solver == *solver
+        && written.bone.as_ref() == bone;
     if complete { Ok(setup) } else { Err(Malformed::IncompleteSetup) }
 }
 

@@ -58,6 +58,9 @@ fn slot(message: &mut v1::ParameterValues, parameter: Parameter) -> &mut Option<
         Parameter::BoneThickness => &mut message.bone_thickness,
         Parameter::BoneQualityFactor => &mut message.bone_quality_factor,
         Parameter::CouplingSoundSpeed => &mut message.coupling_sound_speed,
+        Parameter::Porosity => &mut message.porosity,
+        Parameter::SurfacePorosity => &mut message.surface_porosity,
+        Parameter::MarrowPorosity => &mut message.marrow_porosity,
     }
 }
 

@@ -11,7 +11,7 @@ use osteon_common::violations::Violations;
 use crate::fields;
 use crate::v1;
 
-/// The four messages of a [`Setup`].
+/// The messages of a [`Setup`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetupMessages {
     /// Field `layers`.
@@ -22,6 +22,8 @@ pub struct SetupMessages {
     pub picking: v1::Picking,
     /// Field `solver`.
     pub solver: v1::SolverSettings,
+    /// Field `bone`; `None` without pores.
+    pub bone: Option<v1::Bone>,
 }
 
 /// Returns the complete messages of a setup: every field is present.
@@ -32,16 +34,18 @@ pub fn to_messages(setup: &Setup) -> SetupMessages {
         probe: fields::to_message(&mut setup.probe),
         picking: fields::to_message(&mut setup.picking),
         solver: fields::to_message(&mut setup.solver),
+        bone: setup.pores.is_any().then(|| fields::to_message(&mut setup.pores)),
     }
 }
 
-/// Returns the setup of four optional messages. Unknown enumeration values, and fields that the
+/// Returns the setup of five optional messages. Unknown enumeration values, and fields that the
 /// solver's method does not have, are added to `violations`; numbers are not checked here.
 pub fn from_messages(
     layers: Option<&v1::Layers>,
     probe: Option<&v1::Probe>,
     picking: Option<&v1::Picking>,
     solver: Option<&v1::SolverSettings>,
+    bone: Option<&v1::Bone>,
     violations: &mut Violations,
 ) -> Setup {
     let mut setup = Setup::default();
@@ -50,6 +54,9 @@ pub fn from_messages(
     }
     if let Some(message) = probe {
         fields::from_message("probe", message, &mut setup.probe, violations);
+    }
+    if let Some(message) = bone {
+        fields::from_message("bone", message, &mut setup.pores, violations);
     }
     setup.picking =
         picking.map_or(setup.picking, |message| picking_from_message(message, violations));

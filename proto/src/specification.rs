@@ -29,6 +29,7 @@ pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
         probe: Some(messages.probe),
         picking: Some(messages.picking),
         solver: Some(messages.solver),
+        bone: messages.bone,
         data: specification.data.as_ref().map(data_to_message),
         parameters: Some(parameters_to_message(&specification.parameters)),
         random: random_to_message(&specification.random),
@@ -51,8 +52,11 @@ pub fn from_message(message: &v1::JobSpecification) -> Result<JobSpecification, 
 }
 
 /// Returns the path in the message of a field of a job file. They differ for the ranges of
-/// parameters.
+/// parameters, and for the profile of a porosity.
 fn field_of_message(field: &str) -> String {
+    if let Some(of_profile) = field.strip_prefix("bone.porosity.") {
+        return format!("bone.profile.{of_profile}");
+    }
     let of_range = field.strip_prefix("parameters.").and_then(|rest| rest.split_once('.'));
     match of_range {
         Some((name, "start")) => format!("parameters.{name}.free.start"),
@@ -85,6 +89,7 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
             message.probe.as_ref(),
             message.picking.as_ref(),
             message.solver.as_ref(),
+            message.bone.as_ref(),
             violations,
         ),
         data: message.data.as_ref().and_then(|data| data_from_message(data, violations)),
@@ -130,6 +135,9 @@ fn data_to_message(data: &Data) -> v1::Data {
                     bone_thickness: known.get(Parameter::BoneThickness),
                     bone_quality_factor: known.get(Parameter::BoneQualityFactor),
                     coupling_sound_speed: known.get(Parameter::CouplingSoundSpeed),
+                    porosity: known.get(Parameter::Porosity),
+                    surface_porosity: known.get(Parameter::SurfacePorosity),
+                    marrow_porosity: known.get(Parameter::MarrowPorosity),
                 }
             };
             v1::Data { groups: groups.iter().map(group).collect(), ..message }
@@ -186,6 +194,9 @@ fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measu
                 subjects: numbers(&group.subjects),
                 observables: observables(&group.observables),
                 known: KnownQuantities::new([
+                    group.porosity,
+                    group.surface_porosity,
+                    group.marrow_porosity,
                     group.bone_thickness,
                     group.bone_quality_factor,
                     group.coupling_sound_speed,
@@ -267,6 +278,9 @@ fn range_slot(
         Parameter::BoneThickness => &mut message.bone_thickness,
         Parameter::BoneQualityFactor => &mut message.bone_quality_factor,
         Parameter::CouplingSoundSpeed => &mut message.coupling_sound_speed,
+        Parameter::Porosity => &mut message.porosity,
+        Parameter::SurfacePorosity => &mut message.surface_porosity,
+        Parameter::MarrowPorosity => &mut message.marrow_porosity,
     }
 }
 

@@ -84,7 +84,8 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
     if constants.any(wrong) {
         return;
     }
-    if let Err(inadmissible) = specification.start().constants().elasticity() {
+    let pores = &specification.setup.pores;
+    if let Err(inadmissible) = pores.mean_bone(&specification.start()) {
         violations.add(
             "parameters",
             format!("the point of starts and fixed values is not admissible: {inadmissible}"),

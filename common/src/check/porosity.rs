@@ -1,15 +1,15 @@
 //! Rules on a porosity, and on the model by which density and elasticity are computed from it.
 
 use crate::plausible;
-use crate::porosity::{self, PorosityModel};
+use crate::porosity::{self, CasePorosityModel};
 use crate::violations::Violations;
 
 use super::section::section;
 use super::value::quantity;
 
 /// Records all violations of `model`, which is the table `name` of a file.
-pub fn porosity_model(name: &str, model: &PorosityModel, violations: &mut Violations) {
-    let (mut checked, mut default) = (*model, PorosityModel::default());
+pub fn porosity_model(name: &str, model: &CasePorosityModel, violations: &mut Violations) {
+    let (mut checked, mut default) = (*model, CasePorosityModel::default());
     section(name, &mut checked, &mut default, violations);
     let matrix = format!("{name}.matrix");
     if violations.has_at_or_below(&matrix) {

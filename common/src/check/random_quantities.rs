@@ -11,7 +11,7 @@ use super::setup::setup as check_setup;
 use super::value::known_wrong;
 
 /// Sections of which each realization has one of its own.
-pub(super) const OF_SETUP: [&str; 4] = ["layers", "probe", "picking", "solver"];
+pub(super) const OF_SETUP: [&str; 5] = ["layers", "probe", "picking", "solver", "bone"];
 
 /// Records all violations of `random`, whose means are in `setup`, which has been checked.
 ///

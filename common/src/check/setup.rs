@@ -9,6 +9,7 @@ use crate::sampling::pair_count;
 use crate::settings::Method;
 use crate::violations::Violations;
 
+use super::pores::pores;
 use super::section::section;
 use super::value::{known_wrong, quantity};
 
@@ -22,6 +23,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
         }
         section(key.name, declared, default, violations);
     }
+    pores(&setup.pores, violations);
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);
     tilted(setup, violations);

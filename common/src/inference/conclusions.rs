@@ -55,7 +55,8 @@ fn all_starts(
     let most = tolerance(specification).map_or(cost, |tolerance| tolerance.max(cost));
     let matching: Vec<Point> =
         points.iter().filter(|one| one.cost <= most).map(|one| one.point).collect();
-    Solutions { points, matching: matching.len() as u64, spread: spread(&matching) }
+    let spread = spread(&matching, &specification.setup.pores);
+    Solutions { points, matching: matching.len() as u64, spread }
 }
 
 /// Returns the meaning of the best point of a search with this cost.

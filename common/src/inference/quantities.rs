@@ -4,7 +4,6 @@ use std::array;
 
 use super::linear::{Linear, NoiseResponse};
 use super::noise::{NORMAL, Noise};
-use crate::bulk_velocity::bulk_velocity;
 use crate::conclusions::{DerivedQuantity, Uncertainty};
 use crate::data_statistics::{FewIntervals, intervals_of_data};
 use crate::ensemble::DISPERSION_MAX;
@@ -61,7 +60,7 @@ pub(super) struct Quantities<'a> {
 impl Quantities<'_> {
     /// √(c1111/ρ). Its logarithm is close to normally distributed.
     pub(super) fn bulk_velocity(&self, free: &[Parameter]) -> Option<DerivedQuantity> {
-        let bulk = bulk_velocity(&self.best.point).ok()?;
+        let bulk = self.specification.setup.pores.bulk_velocity(&self.best.point).ok()?;
         let slope = |&parameter: &Parameter| {
             bulk.gradient[parameter as usize] * self.specification.range(parameter).edge()
         };
@@ -88,7 +87,7 @@ impl Quantities<'_> {
             let quantity = match parameter {
                 Parameter::Dispersion => self.dispersion(free),
                 _ if parameter.row().scale == ParameterScale::Linear => {
-                    self.poisson_ratio(parameter, free)
+                    self.on_linear_scale(parameter, free)
                 }
                 _ if self.may_have_second_value(parameter) => {
                     DerivedQuantity { value, known: None }
@@ -129,13 +128,15 @@ impl Quantities<'_> {
     fn logarithm_at(&self, parameter: Parameter, value: f64) -> f64 {
         let mut point = self.best.point;
         point.0[parameter as usize] = value;
-        bulk_velocity(&point).map_or(f64::INFINITY, |found| found.logarithm)
+        let velocity = self.specification.setup.pores.bulk_velocity(&point);
+        velocity.map_or(f64::INFINITY, |found| found.logarithm)
     }
 
-    fn poisson_ratio(&self, parameter: Parameter, free: &[Parameter]) -> DerivedQuantity {
+    /// Returns a parameter whose interval ends where its law does, or its values.
+    fn on_linear_scale(&self, parameter: Parameter, free: &[Parameter]) -> DerivedQuantity {
         let value = self.best.point.get(parameter);
         let known = self.response(&self.along(parameter, free, 1.0)).map(|response| {
-            let [lowest, highest] = admissible_ratios(parameter, &self.best.point);
+            let [lowest, highest] = admissible(parameter, &self.best.point);
             let [below, above] = self.reaches(&response);
             let interval = [(value - below).max(lowest), (value + above).min(highest)];
             let NoiseResponse { deviation, free_share, .. } = response;
@@ -235,16 +236,21 @@ fn modulus_of_least_stiffness(point: &Point) -> f64 {
     4.0 * point.get(Parameter::TransverseYoungModulus) * ratio * ratio / a
 }
 
-/// Returns the ends of the values of a Poisson ratio with which the mean model is admissible, with
-/// the other parameters as in `point`: e_L (1 - ν_T) - 2 e_T ν_L² is positive between them.
-fn admissible_ratios(parameter: Parameter, point: &Point) -> [f64; 2] {
+/// Returns the ends of the values with which the mean model is admissible, with the other parameters as in
+/// `point`: between those of a Poisson ratio, e_L (1 - ν_T) - 2 e_T ν_L² is positive.
+fn admissible(parameter: Parameter, point: &Point) -> [f64; 2] {
     let young = point.get(Parameter::LongitudinalYoungModulus);
     let transverse = point.get(Parameter::TransverseYoungModulus);
-    if parameter == Parameter::TransversePoissonRatio {
-        let ratio = point.get(Parameter::LongitudinalPoissonRatio);
-        return [-1.0, 1.0 - 2.0 * transverse * ratio * ratio / young];
+    match parameter {
+        Parameter::TransversePoissonRatio => {
+            let ratio = point.get(Parameter::LongitudinalPoissonRatio);
+            [-1.0, 1.0 - 2.0 * transverse * ratio * ratio / young]
+        }
+        Parameter::LongitudinalPoissonRatio => {
+            let ratio = point.get(Parameter::TransversePoissonRatio);
+            let most = (young * (1.0 - ratio) / (2.0 * transverse)).sqrt();
+            [-most, most]
+        }
+        _ => parameter.row().accepted.limits(),
     }
-    let ratio = point.get(Parameter::TransversePoissonRatio);
-    let most = (young * (1.0 - ratio) / (2.0 * transverse)).sqrt();
-    [-most, most]
 }

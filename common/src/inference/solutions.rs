@@ -4,6 +4,7 @@
 use crate::conclusions::{Solution, Spread, Spreads};
 use crate::elasticity::Elasticity;
 use crate::parameters::Point;
+use crate::pores::Pores;
 use crate::results::Evaluation;
 
 /// Returns the best point of each start of set number `set` that found a feasible one.
@@ -24,8 +25,8 @@ pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     solutions
 }
 
-/// Returns the spreads over points; `None` if there are none.
-pub fn spread(points: &[Point]) -> Option<Spreads> {
+/// Returns the spreads over points, of a bone with these pores; `None` if there are none.
+pub fn spread(points: &[Point], pores: &Pores) -> Option<Spreads> {
     let of = |values: &mut dyn Iterator<Item = f64>| {
         let mut spread = Spread { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, mean: 0.0 };
         for value in values {
@@ -40,8 +41,8 @@ pub fn spread(points: &[Point]) -> Option<Spreads> {
         |(parameter, _)| (parameter, of(&mut points.iter().map(|point| point.get(parameter))));
     let parameters = first.given().map(of_parameter).collect();
     // Points that were evaluated are always admissible.
-    let matrices: Vec<Elasticity> =
-        points.iter().filter_map(|point| point.constants().elasticity().ok()).collect();
+    let mean = |point: &Point| Some(pores.mean_bone(point).ok()?.elasticity);
+    let matrices: Vec<Elasticity> = points.iter().filter_map(mean).collect();
     let entries = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
     let entries =
         entries.map(|(i, j)| (i, j, of(&mut matrices.iter().map(|matrix| matrix.rows()[i][j]))));

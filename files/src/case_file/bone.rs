@@ -7,7 +7,7 @@ use osteon_common::elasticity::{Elasticity, EngineeringConstants};
 use osteon_common::field_path::element_path;
 use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::parameters::Parameter;
-use osteon_common::porosity::{POROSITY, PorosityModel};
+use osteon_common::porosity::{CasePorosityModel, POROSITY, PorosityModel};
 use osteon_common::setup_quantity::SetupQuantity;
 use osteon_common::violations::Violations;
 
@@ -54,6 +54,9 @@ pub(super) fn read(reader: &mut Reader, root: &Table<'_>, setup: &mut Setup) -> 
         return None;
     }
     let model = porosity_model(reader, &table)?;
+    if !table.has(SUBLAYERS) && table.holds_table(POROSITY.name) {
+        return porosity::profile(reader, &table, &model, setup.layers.bone_thickness);
+    }
     if !table.has(SUBLAYERS) {
         return solid(reader, &table, &model).map(CaseBone::Homogeneous);
     }
@@ -64,7 +67,7 @@ pub(super) fn read(reader: &mut Reader, root: &Table<'_>, setup: &mut Setup) -> 
 }
 
 /// Returns how porosities are read, of the bone or of its sublayers; `None` if there is none to be read so.
-fn porosity_model(reader: &mut Reader, table: &Table<'_>) -> Option<PorosityModel> {
+fn porosity_model(reader: &mut Reader, table: &Table<'_>) -> Option<CasePorosityModel> {
     let model = porosity::model(reader, table);
     let is_porous = |node: &Node| match &node.value {
         Value::List(sublayers) => sublayers.iter().any(|one| one.holds(POROSITY.name)),
@@ -99,7 +102,11 @@ fn refuse_keys_of_one_solid(reader: &mut Reader, root: &Table<'_>, table: &Table
 }
 
 /// Reads the sublayers.
-fn sublayers(reader: &mut Reader, bone: &Table<'_>, model: &PorosityModel) -> Option<Sublayers> {
+fn sublayers(
+    reader: &mut Reader,
+    bone: &Table<'_>,
+    model: &CasePorosityModel,
+) -> Option<Sublayers> {
     let path = bone.path(SUBLAYERS);
     let expected =
         format!("a list of 1 to {SUBLAYERS_MAX} tables, from the skin's side to the marrow's");
@@ -126,7 +133,7 @@ fn sublayers(reader: &mut Reader, bone: &Table<'_>, model: &PorosityModel) -> Op
 }
 
 /// Reads one sublayer; `None` after recording the violations.
-fn sublayer(reader: &mut Reader, table: &Table<'_>, model: &PorosityModel) -> Option<Sublayer> {
+fn sublayer(reader: &mut Reader, table: &Table<'_>, model: &CasePorosityModel) -> Option<Sublayer> {
     if !table.is_table() {
         return None;
     }
@@ -161,7 +168,7 @@ fn whole_thickness(reader: &mut Reader, bone: &Table<'_>, sublayers: &Sublayers)
 }
 
 /// Reads the keys of one solid in `table`; `None` after recording the violations.
-fn solid(reader: &mut Reader, table: &Table<'_>, model: &PorosityModel) -> Option<Bone> {
+fn solid(reader: &mut Reader, table: &Table<'_>, model: &CasePorosityModel) -> Option<Bone> {
     if table.has(POROSITY.name) {
         return porosity::bone(reader, table, model);
     }

@@ -1,20 +1,23 @@
 //! `porosity` and `porosity_model` of a case file: the bone of a porosity replaces the name before anything
 //! else sees it, as that of a material does.
 
+use osteon_common::bone::CaseBone;
 use osteon_common::case::Bone;
 use osteon_common::check;
 use osteon_common::parameters::Parameter;
-use osteon_common::porosity::{POROSITY, PorosityModel};
+use osteon_common::pores::Pores;
+use osteon_common::porosity::{CasePorosityModel, NoPorousBone, POROSITY, PorosityModel};
 
 use crate::materials::{self, Material};
+use crate::pores;
 use crate::reader::{self, Reader, Table};
 
 /// Path of the model in a case file.
 const MODEL_PATH: &str = "bone.porosity_model";
 
 /// Reads the model in `table`. If it is wrong, this is recorded, and the model has no meaning.
-pub(super) fn model(reader: &mut Reader, table: &Table<'_>) -> PorosityModel {
-    let mut model = PorosityModel::default();
+pub(super) fn model(reader: &mut Reader, table: &Table<'_>) -> CasePorosityModel {
+    let mut model = CasePorosityModel::default();
     let read = reader::section(reader, table, PorosityModel::KEY.name, &mut model);
     if read.is_table() {
         check::porosity_model(MODEL_PATH, &model, &mut reader.violations);
@@ -23,8 +26,44 @@ pub(super) fn model(reader: &mut Reader, table: &Table<'_>) -> PorosityModel {
 }
 
 /// Returns the bone of the porosity in `table`, or `None` after recording the violations.
-pub(super) fn bone(reader: &mut Reader, table: &Table<'_>, model: &PorosityModel) -> Option<Bone> {
+pub(super) fn bone(
+    reader: &mut Reader,
+    table: &Table<'_>,
+    model: &CasePorosityModel,
+) -> Option<Bone> {
     let path = table.path(POROSITY.name);
+    refuse_beside(reader, table, &path);
+    let porosity = reader.number(table, POROSITY.name)?;
+    check::porosity(&path, porosity, &mut reader.violations);
+    if is_wrong(reader, &path) {
+        return None;
+    }
+    let bone = model.model.bone(&model.matrix, porosity);
+    bone.map_err(|none| reader.violations.add(path, format!("is {porosity:?}; {none}"))).ok()
+}
+
+/// Returns the bone of the profile in `table`, whose thickness is `thickness` (m), or `None` after recording
+/// the violations.
+pub(super) fn profile(
+    reader: &mut Reader,
+    table: &Table<'_>,
+    model: &CasePorosityModel,
+    thickness: f64,
+) -> Option<CaseBone> {
+    let path = table.path(POROSITY.name);
+    refuse_beside(reader, table, &path);
+    let (porosity, profile) = pores::porosity(reader, table);
+    check::porosity_profile(&path, &profile, &mut reader.violations);
+    if is_wrong(reader, &path) {
+        return None;
+    }
+    let pores = Pores { porosity, profile, model: model.model };
+    let bone = pores.bone(&model.matrix, thickness, Ok::<_, NoPorousBone>);
+    bone.map_err(|none| reader.violations.add(path, format!("has no bone: {none}"))).ok()
+}
+
+/// Refuses what a porosity replaces.
+fn refuse_beside(reader: &mut Reader, table: &Table<'_>, path: &str) {
     let replaced = [materials::KEY, "mandel"].into_iter().chain(Material::HAS.map(Parameter::name));
     let beside: Vec<_> = replaced.filter(|key| table.has(key)).collect();
     if !beside.is_empty() {
@@ -33,19 +72,11 @@ pub(super) fn bone(reader: &mut Reader, table: &Table<'_>, model: &PorosityModel
             "is given together with {beside}; density and elasticity follow from it: give one or the \
              other (those of the bone between the pores belong to {MODEL_PATH}.matrix)"
         );
-        reader.violations.add(&path, message);
+        reader.violations.add(path, message);
     }
-    let porosity = reader.number(table, POROSITY.name)?;
-    check::porosity(&path, porosity, &mut reader.violations);
-    let known_wrong = |path: &str| reader.violations.has_at_or_below(path);
-    if known_wrong(&path) || known_wrong(MODEL_PATH) {
-        return None;
-    }
-    match model.bone(porosity) {
-        Ok(bone) => Some(bone),
-        Err(none) => {
-            reader.violations.add(path, format!("is {porosity:?}; {none}"));
-            None
-        }
-    }
+}
+
+/// Returns whether the porosity, or the model, is known to be wrong.
+fn is_wrong(reader: &Reader, path: &str) -> bool {
+    [path, MODEL_PATH].into_iter().any(|path| reader.violations.has_at_or_below(path))
 }

@@ -4,7 +4,8 @@ use osteon_common::case::Setup;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, entries};
 use osteon_common::job::{PosteriorSettings, RunSettings};
 use osteon_common::parameters::{BONE_PARAMETERS, Parameter};
-use osteon_common::porosity::{self, POROSITY, PorosityModel};
+use osteon_common::pores::PorosityProfile;
+use osteon_common::porosity::{self, CasePorosityModel, POROSITY, PorosityModel};
 
 use crate::toml_text;
 
@@ -17,14 +18,16 @@ pub fn setup_table() -> String {
     table(&sections.concat())
 }
 
-/// Returns the table of the keys of a case file that give its bone by a porosity.
+/// Returns the table of the keys that give a bone by its porosity. Those of the matrix belong to case files
+/// alone.
 pub fn porosity_table() -> String {
-    let (section, accepted) = (PorosityModel::KEY, porosity::ACCEPTED.to_string());
+    let (model, path) = (PorosityModel::KEY, format!("bone.{}", POROSITY.name));
     table(&format!(
-        "{}{}{}",
-        row(&format!("bone.{}", POROSITY.name), "", &accepted, POROSITY.meaning),
-        row(&format!("bone.{}", section.name), "", "", section.meaning),
-        rows(&format!("bone.{}", section.name), &entries(&mut PorosityModel::default())),
+        "{}{}{}{}",
+        row(&path, "", &porosity::ACCEPTED.to_string(), POROSITY.meaning),
+        rows(&path, &entries(&mut PorosityProfile::default())),
+        row(&format!("bone.{}", model.name), "", "", model.meaning),
+        rows(&format!("bone.{}", model.name), &entries(&mut CasePorosityModel::default())),
     ))
 }
 

@@ -38,11 +38,26 @@ pub(super) fn read(reader: &mut Reader, root: &Table<'_>, setup: &Setup) -> [Ran
         }
         return [UNKNOWN; PARAMETERS];
     }
-    let base = Base::read(reader, &table);
+    let base = base(reader, &table, setup);
     Parameter::ALL.map(|parameter| match parameter.of_setup() {
         Some(quantity) => searched(reader, &table, parameter, quantity.value_in(setup)),
         None => range(reader, &table, parameter, base),
     })
+}
+
+/// Returns what stands in for parameters of the bone that are left out.
+fn base(reader: &mut Reader, table: &Table<'_>, setup: &Setup) -> Base {
+    let named = Base::read(reader, table);
+    match named {
+        Base::None if setup.pores.is_any() => Base::Matrix,
+        Base::Known(_) if setup.pores.is_any() => {
+            let message = "names a whole bone, and with bone.porosity the parameters are those of the bone \
+                           between the pores; leave it out, and give what is known of these";
+            reader.violations.add(table.path(MATERIAL.name), message);
+            Base::Unknown
+        }
+        _ => named,
+    }
 }
 
 /// Placeholder for a range that could not be read; a violation is always recorded with it.

@@ -6,6 +6,8 @@ use osteon_common::fields::{Choice, DeclaredKey, DeclaredValue, Edge, Interval, 
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::observables::Observable;
 use osteon_common::parameters::Parameter;
+use osteon_common::pores::{Pores, PorosityProfile};
+use osteon_common::porosity::{POROSITY, PorosityModel};
 use serde_json::{Map, Value as Json, json};
 
 use crate::materials;
@@ -24,6 +26,7 @@ pub fn schema() -> String {
     for (key, section) in setup.sections() {
         properties.insert(key.name.to_owned(), described(table(&entries(section)), key));
     }
+    properties.insert(Pores::KEY.name.to_owned(), described(pores(), Pores::KEY));
     let data_key = Key { name: "data", meaning: "measured velocities, or their moments" };
     properties.insert(data_key.name.to_owned(), described(data(), data_key));
     let meaning = "the range of each parameter: fixed, or free between bounds";
@@ -44,6 +47,11 @@ pub fn schema() -> String {
         "type": "object",
         "properties": properties,
         "required": ["parameters"],
+        "anyOf": [
+            { "required": [Pores::KEY.name] },
+            { "properties": { "parameters": { "required": [parameters::MATERIAL.name] } } },
+            { "properties": { "parameters": { "required": Parameter::OF_BONE.map(Parameter::name) } } },
+        ],
         "additionalProperties": false,
     });
     format!("{schema:#}\n")
@@ -102,6 +110,15 @@ fn described(schema: Json, Key { meaning, .. }: Key) -> Json {
 fn said_to_be(mut schema: Json, meaning: &str) -> Json {
     schema["description"] = plain(meaning).into();
     schema
+}
+
+fn pores() -> Json {
+    let one = number(None, Parameter::Porosity.row().accepted);
+    let mut profile = table(&entries(&mut PorosityProfile::default()));
+    profile["required"] = json!(["surface", "marrow"]);
+    let model = described(table(&entries(&mut PorosityModel::default())), PorosityModel::KEY);
+    let porosity = described(json!({ "anyOf": [one, profile] }), POROSITY);
+    object(json!({ POROSITY.name: porosity, PorosityModel::KEY.name: model }))
 }
 
 fn data() -> Json {
@@ -184,10 +201,6 @@ fn ranges() -> Json {
     let material = described(json!({ "enum": materials::NAMES }), parameters::MATERIAL);
     ranges["properties"][parameters::MATERIAL.name] = material;
     ranges["required"] = json!([Parameter::Dispersion.name()]);
-    ranges["anyOf"] = json!([
-        { "required": [parameters::MATERIAL.name] },
-        { "required": Parameter::OF_BONE.map(Parameter::name) },
-    ]);
     ranges
 }
 

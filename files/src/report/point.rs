@@ -19,6 +19,15 @@ pub struct MeanModel {
     pub transverse_young_modulus: Option<f64>,
     /// Transverse Poisson ratio.
     pub transverse_poisson_ratio: Option<f64>,
+    /// Porosity of the bone; only if it was searched, or is known of the group.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub porosity: Option<f64>,
+    /// Porosity at the skin's side of the bone; only if it was searched, or is known of the group.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface_porosity: Option<f64>,
+    /// Porosity at the marrow's side of the bone; only if it was searched, or is known of the group.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub marrow_porosity: Option<f64>,
     /// Thickness of the bone, m; only if it was searched, or is known of the group.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bone_thickness: Option<f64>,
@@ -41,6 +50,9 @@ impl MeanModel {
             Parameter::TransverseYoungModulus => self.transverse_young_modulus,
             Parameter::TransversePoissonRatio => self.transverse_poisson_ratio,
             Parameter::Dispersion => None,
+            Parameter::Porosity => self.porosity,
+            Parameter::SurfacePorosity => self.surface_porosity,
+            Parameter::MarrowPorosity => self.marrow_porosity,
             Parameter::BoneThickness => self.bone_thickness,
             Parameter::BoneQualityFactor => self.bone_quality_factor,
             Parameter::CouplingSoundSpeed => self.coupling_sound_speed,
@@ -74,6 +86,9 @@ impl From<&Point> for MeanModel {
             longitudinal_shear_modulus: value(Parameter::LongitudinalShearModulus),
             transverse_young_modulus: value(Parameter::TransverseYoungModulus),
             transverse_poisson_ratio: value(Parameter::TransversePoissonRatio),
+            porosity: searched(Parameter::Porosity),
+            surface_porosity: searched(Parameter::SurfacePorosity),
+            marrow_porosity: searched(Parameter::MarrowPorosity),
             bone_thickness: searched(Parameter::BoneThickness),
             bone_quality_factor: searched(Parameter::BoneQualityFactor),
             coupling_sound_speed: searched(Parameter::CouplingSoundSpeed),

@@ -1,0 +1,58 @@
+//! Rules on the pores of a job's bone.
+
+use crate::parameters::Parameter;
+use crate::pores::{Pores, PorosityProfile};
+use crate::porosity::PorosityModel;
+use crate::setup_quantity::SetupQuantity;
+use crate::violations::Violations;
+
+use super::porosity::porosity;
+use super::section::section;
+use super::value::{known_wrong, number};
+
+/// Records all violations of `pores`, with the paths of a file.
+pub(super) fn pores(pores: &Pores, violations: &mut Violations) {
+    let porosity_key = SetupQuantity::Porosity.mean_key();
+    if let Some(value) = pores.porosity {
+        porosity(porosity_key, value, violations);
+    }
+    porosity_profile(porosity_key, &pores.profile, violations);
+    let PorosityProfile { surface, marrow, .. } = pores.profile;
+    let given = [
+        (SetupQuantity::Porosity, pores.porosity),
+        (SetupQuantity::SurfacePorosity, surface),
+        (SetupQuantity::MarrowPorosity, marrow),
+    ];
+    for (quantity, value) in given {
+        // A job without pores leaves the key out.
+        if let Some(value) = value.filter(|_| !known_wrong(quantity.mean_key(), violations)) {
+            number(quantity.mean_key(), value, Parameter::Porosity.row().accepted, violations);
+        }
+    }
+    if pores.porosity.is_some() && (surface.is_some() || marrow.is_some()) {
+        let message = "is given together with a profile, which has porosities of its own; leave one of \
+                       them out";
+        violations.add(porosity_key, message);
+    }
+    let (mut checked, mut default) = (pores.model, PorosityModel::default());
+    section("bone.porosity_model", &mut checked, &mut default, violations);
+    if pores.model != default && !pores.is_any() && !violations.has_at_or_below("bone") {
+        let message = "is given without a porosity; give bone.porosity, or leave it out";
+        violations.add("bone.porosity_model", message);
+    }
+}
+
+/// Records all violations of a profile, which is the table `name` of a file.
+pub fn porosity_profile(name: &str, profile: &PorosityProfile, violations: &mut Violations) {
+    let (mut checked, mut default) = (*profile, PorosityProfile::default());
+    section(name, &mut checked, &mut default, violations);
+    let missing = match (profile.surface, profile.marrow) {
+        (Some(_), None) => "marrow",
+        (None, Some(_)) => "surface",
+        _ => return,
+    };
+    let field = format!("{name}.{missing}");
+    if !known_wrong(&field, violations) {
+        violations.add(field, "is missing; a profile has surface and marrow");
+    }
+}

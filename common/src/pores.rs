@@ -1,0 +1,249 @@
+//! The pores of a job's bone: their porosity is a quantity of the setup, as the bone's thickness is.
+//!
+//! Where there is a porosity, the mean model of a point (density and engineering constants) is that of the
+//! bone between the pores, and density and mean elasticity of the bone follow by a [`PorosityModel`].
+
+use crate::accepted::WholeRange;
+use crate::bone::{Bone, CaseBone, Sublayer, Sublayers};
+use crate::bulk_velocity::{BulkVelocity, bulk_velocity};
+use crate::fields::{self, Condition, Fields, Key, Number, Section};
+use crate::limits::SUBLAYERS_MAX;
+use crate::parameters::{PARAMETERS, Parameter, Point};
+use crate::plausible;
+use crate::porosity::{self, BoneMatrix, NoPorousBone, PorosityModel};
+
+fields::choices!(ProfileShape);
+
+/// Numbers of sublayers that a linear profile may have.
+pub const SUBLAYERS: WholeRange = WholeRange::new(2, SUBLAYERS_MAX as u64);
+/// Key of the profile on the wire.
+pub const PROFILE: &str = "profile";
+/// The parameters that are porosities.
+const POROSITIES: [Parameter; 3] =
+    [Parameter::Porosity, Parameter::SurfacePorosity, Parameter::MarrowPorosity];
+const POROSITY: &str = "part of the volume that pores take, the same through the thickness";
+/// Relative step of the difference quotients of ln √(c1111/ρ), whose error is its square.
+const STEP: f64 = 1e-5;
+
+/// How the porosity changes from the skin's side to the marrow's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ProfileShape {
+    /// Linearly.
+    #[default]
+    Linear,
+    /// It is that of the skin's side in the outer half of the bone, and that of the marrow's side in the
+    /// inner (endosteal) half.
+    Endosteal,
+}
+
+/// A porosity that changes through the thickness. There is none unless both ends are given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PorosityProfile {
+    /// Porosity at the skin's side.
+    pub surface: Option<f64>,
+    /// Porosity at the marrow's side.
+    pub marrow: Option<f64>,
+    /// How it changes between them.
+    pub shape: ProfileShape,
+    /// Number of sublayers of equal thickness by which a linear profile is computed, each with the porosity
+    /// at its middle.
+    pub sublayers: u32,
+}
+
+/// The pores of the bone; without any porosity there are none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Pores {
+    /// The porosity, if it is the same through the thickness.
+    pub porosity: Option<f64>,
+    /// The porosity, if it is not.
+    pub profile: PorosityProfile,
+    /// How density and elasticity follow.
+    pub model: PorosityModel,
+}
+
+impl ProfileShape {
+    /// All shapes, in the order of a user's file.
+    pub const ALL: [Self; 2] = [Self::Linear, Self::Endosteal];
+
+    /// Returns the name used in files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Endosteal => "endosteal",
+        }
+    }
+}
+
+impl Default for PorosityProfile {
+    fn default() -> Self {
+        Self { surface: None, marrow: None, shape: ProfileShape::default(), sublayers: 6 }
+    }
+}
+
+impl PorosityProfile {
+    /// Returns both ends; `None` unless both are given.
+    pub fn ends(&self) -> Option<[f64; 2]> {
+        Some([self.surface?, self.marrow?])
+    }
+
+    /// Returns the porosity of each sublayer, downwards, all of the same thickness.
+    fn of_sublayers(&self, [surface, marrow]: [f64; 2]) -> Vec<f64> {
+        match self.shape {
+            ProfileShape::Endosteal => vec![surface, marrow],
+            ProfileShape::Linear => {
+                let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(self.sublayers);
+                let at = |i| (marrow - surface).mul_add(middle(i), surface);
+                (0..self.sublayers).map(at).collect()
+            }
+        }
+    }
+}
+
+impl Pores {
+    /// The section of a job file that has them.
+    pub const KEY: Key = Key {
+        name: "bone",
+        meaning: "pores of the bone: with a porosity, density and constants in `parameters` are those of \
+                  the bone between the pores",
+    };
+
+    /// Returns whether there are pores.
+    pub fn is_any(&self) -> bool {
+        self.mean_porosity().is_some()
+    }
+
+    /// Returns the mean porosity through the thickness; `None` without pores.
+    pub fn mean_porosity(&self) -> Option<f64> {
+        self.porosity
+            .or_else(|| self.profile.ends().map(|[surface, marrow]| 0.5 * (surface + marrow)))
+    }
+
+    /// Returns the pores with the porosities of a point, where it has any.
+    fn at(&self, point: &Point) -> Self {
+        let searched = |parameter: Parameter, own: Option<f64>| {
+            let value = Some(point.get(parameter)).filter(|_| point.has(parameter));
+            value.or(own)
+        };
+        Self {
+            porosity: searched(Parameter::Porosity, self.porosity),
+            profile: PorosityProfile {
+                surface: searched(Parameter::SurfacePorosity, self.profile.surface),
+                marrow: searched(Parameter::MarrowPorosity, self.profile.marrow),
+                ..self.profile
+            },
+            ..*self
+        }
+    }
+
+    /// Returns the mean bone at a point: density and mean elasticity. Where the porosity changes through
+    /// the thickness, it is that of the mean porosity.
+    ///
+    /// # Errors
+    /// If the mean model of the point is not admissible, or has no stiffness with these pores.
+    pub fn mean_bone(&self, point: &Point) -> Result<Bone, NoPorousBone> {
+        let matrix = point.mean_model();
+        match self.at(point).mean_porosity() {
+            Some(porosity) => self.model.bone(&matrix, porosity),
+            None => Ok(matrix.bone()?),
+        }
+    }
+
+    /// Returns ln √(c1111/ρ) of the mean bone at a point, with its derivatives. Those with pores are
+    /// difference quotients.
+    ///
+    /// # Errors
+    /// Same as [`Pores::mean_bone`].
+    pub fn bulk_velocity(&self, point: &Point) -> Result<BulkVelocity, NoPorousBone> {
+        let of_matrix = bulk_velocity(point)?;
+        if !self.at(point).is_any() {
+            return Ok(of_matrix);
+        }
+        let mut gradient = [0.0; PARAMETERS];
+        for parameter in Parameter::ALL {
+            let place = parameter as usize;
+            let is_searched = POROSITIES.contains(&parameter) && point.has(parameter);
+            if of_matrix.gradient[place] != 0.0 || is_searched {
+                gradient[place] = self.slope(point, place)?;
+            }
+        }
+        Ok(BulkVelocity { logarithm: self.bulk_logarithm(point)?, gradient })
+    }
+
+    fn slope(&self, point: &Point, place: usize) -> Result<f64, NoPorousBone> {
+        let step = STEP * point.0[place].abs().max(STEP);
+        let at = |step: f64| {
+            let mut beside = *point;
+            beside.0[place] += step;
+            self.bulk_logarithm(&beside)
+        };
+        Ok((at(step)? - at(-step)?) / (2.0 * step))
+    }
+
+    fn bulk_logarithm(&self, point: &Point) -> Result<f64, NoPorousBone> {
+        let Bone { density, elasticity } = self.mean_bone(point)?;
+        Ok(0.5 * libm::log(elasticity.rows()[0][0] / density))
+    }
+
+    /// Returns the bone that a matrix with these pores is, with `realize` of each of its solids in place of
+    /// that; `thickness` (m) is that of the bone.
+    ///
+    /// # Errors
+    /// If a solid does not exist, or as `realize`.
+    pub fn bone<E: From<NoPorousBone>>(
+        &self,
+        matrix: &BoneMatrix,
+        thickness: f64,
+        realize: impl Fn(Bone) -> Result<Bone, E>,
+    ) -> Result<CaseBone, E> {
+        let solid = |porosity| realize(self.model.bone(matrix, porosity)?);
+        let Some(ends) = self.profile.ends().filter(|_| self.porosity.is_none()) else {
+            return solid(self.porosity.unwrap_or(0.0)).map(CaseBone::Homogeneous);
+        };
+        let porosities = self.profile.of_sublayers(ends);
+        let each = thickness / porosities.len() as f64;
+        let sublayer = |&porosity| Ok(Sublayer { thickness: each, solid: solid(porosity)? });
+        let sublayers = porosities.iter().map(sublayer).collect::<Result<Vec<_>, E>>()?;
+        let layered = Sublayers::new(&sublayers).map(CaseBone::Layered);
+        layered.ok_or_else(|| NoPorousBone::Sublayers { count: sublayers.len() }.into())
+    }
+}
+
+impl Section for Pores {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        let number = Number::plausible(porosity::ACCEPTED, &plausible::POROSITY);
+        let key = Key { name: porosity::POROSITY.name, meaning: POROSITY };
+        fields.optional_number(key, &mut self.porosity, number);
+        let meaning = "instead of `porosity`: one that changes from the skin's side to the marrow's; in a \
+                       file it is written as `porosity = { surface = …, marrow = … }`";
+        fields.table(Key { name: PROFILE, meaning }, &mut |fields| self.profile.declare(fields));
+        fields.table(PorosityModel::KEY, &mut |fields| self.model.declare(fields));
+    }
+}
+
+impl Section for PorosityProfile {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        let number = Number::plausible(porosity::ACCEPTED, &plausible::POROSITY);
+        let key = Key { name: "surface", meaning: "porosity at the skin's side of the bone" };
+        fields.optional_number(key, &mut self.surface, number);
+        let key = Key { name: "marrow", meaning: "porosity at the marrow's side" };
+        fields.optional_number(key, &mut self.marrow, number);
+        let meaning = "`\"linear\"`; or `\"endosteal\"`: the inner half of the bone has that of the \
+                       marrow's side, and the outer half that of the skin's";
+        fields.choice(Key { name: "shape", meaning }, &mut self.shape);
+        let condition = Condition {
+            holds: self.shape == ProfileShape::Linear,
+            decided_by: "shape",
+            description: "with the shape `\"linear\"`",
+            refusal: "belongs to the shape \"linear\", which is not chosen; leave it out"
+                .to_owned(),
+        };
+        fields.only_if(&condition, &mut |fields| {
+            let meaning =
+                "number of sublayers of equal thickness, each with the porosity at its middle";
+            fields.whole(Key { name: "sublayers", meaning }, &mut self.sublayers, SUBLAYERS);
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests;
