@@ -271,6 +271,9 @@ impl Parameter {
         of_setup
     };
 
+    /// The porosities: parameters of the setup that √(c1111/ρ) depends on.
+    pub const OF_PORES: [Self; 3] = [Self::Porosity, Self::SurfacePorosity, Self::MarrowPorosity];
+
     /// Returns the row of the table.
     pub const fn row(self) -> &'static ParameterRow {
         &ROWS[self as usize]

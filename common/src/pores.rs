@@ -18,10 +18,6 @@ fields::choices!(ProfileShape);
 pub const SUBLAYERS: WholeRange = WholeRange::new(2, SUBLAYERS_MAX as u64);
 /// Key of the profile on the wire.
 pub const PROFILE: &str = "profile";
-/// The parameters that are porosities.
-const POROSITIES: [Parameter; 3] =
-    [Parameter::Porosity, Parameter::SurfacePorosity, Parameter::MarrowPorosity];
-const POROSITY: &str = "part of the volume that pores take, the same through the thickness";
 /// Relative step of the difference quotients of ln √(c1111/ρ), whose error is its square.
 const STEP: f64 = 1e-5;
 
@@ -135,12 +131,12 @@ impl Pores {
         }
     }
 
-    /// Returns the mean bone at a point: density and mean elasticity. Where the porosity changes through
+    /// Returns the mean solid at a point: density and mean elasticity of the bone. Where the porosity changes through
     /// the thickness, it is that of the mean porosity.
     ///
     /// # Errors
     /// If the mean model of the point is not admissible, or has no stiffness with these pores.
-    pub fn mean_bone(&self, point: &Point) -> Result<Bone, NoPorousBone> {
+    pub fn mean_solid(&self, point: &Point) -> Result<Bone, NoPorousBone> {
         let matrix = point.mean_model();
         match self.at(point).mean_porosity() {
             Some(porosity) => self.model.bone(&matrix, porosity),
@@ -148,11 +144,11 @@ impl Pores {
         }
     }
 
-    /// Returns ln √(c1111/ρ) of the mean bone at a point, with its derivatives. Those with pores are
+    /// Returns ln √(c1111/ρ) of the mean solid at a point, with its derivatives. Those with pores are
     /// difference quotients.
     ///
     /// # Errors
-    /// Same as [`Pores::mean_bone`].
+    /// Same as [`Pores::mean_solid`].
     pub fn bulk_velocity(&self, point: &Point) -> Result<BulkVelocity, NoPorousBone> {
         let of_matrix = bulk_velocity(point)?;
         if !self.at(point).is_any() {
@@ -161,15 +157,21 @@ impl Pores {
         let mut gradient = [0.0; PARAMETERS];
         for parameter in Parameter::ALL {
             let place = parameter as usize;
-            let is_searched = POROSITIES.contains(&parameter) && point.has(parameter);
+            let is_searched = Parameter::OF_PORES.contains(&parameter) && point.has(parameter);
             if of_matrix.gradient[place] != 0.0 || is_searched {
-                gradient[place] = self.slope(point, place)?;
+                gradient[place] = self.bulk_slope(point, parameter)?;
             }
         }
         Ok(BulkVelocity { logarithm: self.bulk_logarithm(point)?, gradient })
     }
 
-    fn slope(&self, point: &Point, place: usize) -> Result<f64, NoPorousBone> {
+    /// Returns the derivative of [`Pores::bulk_logarithm`] with respect to a parameter, as a difference
+    /// quotient.
+    ///
+    /// # Errors
+    /// Same as [`Pores::mean_solid`].
+    pub fn bulk_slope(&self, point: &Point, parameter: Parameter) -> Result<f64, NoPorousBone> {
+        let place = parameter as usize;
         let step = STEP * point.0[place].abs().max(STEP);
         let at = |step: f64| {
             let mut beside = *point;
@@ -179,8 +181,15 @@ impl Pores {
         Ok((at(step)? - at(-step)?) / (2.0 * step))
     }
 
-    fn bulk_logarithm(&self, point: &Point) -> Result<f64, NoPorousBone> {
-        let Bone { density, elasticity } = self.mean_bone(point)?;
+    /// Returns ln √(c1111/ρ) of the mean solid at a point, the velocity in m/s.
+    ///
+    /// # Errors
+    /// Same as [`Pores::mean_solid`].
+    pub fn bulk_logarithm(&self, point: &Point) -> Result<f64, NoPorousBone> {
+        if !self.at(point).is_any() {
+            return Ok(bulk_velocity(point)?.logarithm);
+        }
+        let Bone { density, elasticity } = self.mean_solid(point)?;
         Ok(0.5 * libm::log(elasticity.rows()[0][0] / density))
     }
 
@@ -196,8 +205,12 @@ impl Pores {
         realize: impl Fn(Bone) -> Result<Bone, E>,
     ) -> Result<CaseBone, E> {
         let solid = |porosity| realize(self.model.bone(matrix, porosity)?);
-        let Some(ends) = self.profile.ends().filter(|_| self.porosity.is_none()) else {
-            return solid(self.porosity.unwrap_or(0.0)).map(CaseBone::Homogeneous);
+        if let Some(porosity) = self.porosity {
+            return solid(porosity).map(CaseBone::Homogeneous);
+        }
+        let Some(ends) = self.profile.ends() else {
+            let whole = matrix.bone().map_err(NoPorousBone::from)?;
+            return realize(whole).map(CaseBone::Homogeneous);
         };
         let porosities = self.profile.of_sublayers(ends);
         let each = thickness / porosities.len() as f64;
@@ -211,7 +224,8 @@ impl Pores {
 impl Section for Pores {
     fn declare(&mut self, fields: &mut dyn Fields) {
         let number = Number::plausible(porosity::ACCEPTED, &plausible::POROSITY);
-        let key = Key { name: porosity::POROSITY.name, meaning: POROSITY };
+        let meaning = "part of the volume that pores take, the same through the thickness";
+        let key = Key { name: porosity::POROSITY.name, meaning };
         fields.optional_number(key, &mut self.porosity, number);
         let meaning = "instead of `porosity`: one that changes from the skin's side to the marrow's; in a \
                        file it is written as `porosity = { surface = …, marrow = … }`";

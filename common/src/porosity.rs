@@ -204,6 +204,16 @@ impl Section for PorosityModel {
     }
 }
 
+impl CasePorosityModel {
+    /// Returns the bone of this porosity.
+    ///
+    /// # Errors
+    /// Same as [`PorosityModel::bone`].
+    pub fn bone(&self, porosity: f64) -> Result<Bone, NoPorousBone> {
+        self.model.bone(&self.matrix, porosity)
+    }
+}
+
 impl Section for CasePorosityModel {
     fn declare(&mut self, fields: &mut dyn Fields) {
         self.model.declare(fields);

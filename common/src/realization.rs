@@ -55,6 +55,15 @@ pub enum NoBone {
     Pores(#[from] NoPorousBone),
 }
 
+/// Returns the mean bone at a point, given the point's setup ([`Point::setup`]): the realization without
+/// dispersion.
+///
+/// # Errors
+/// If the mean model is not admissible, or has no stiffness with the pores of the setup.
+pub fn mean_bone(point: &Point, setup: &Setup) -> Result<CaseBone, NoPorousBone> {
+    setup.pores.bone(&point.mean_model(), setup.layers.bone_thickness, Ok)
+}
+
 impl Ensemble {
     /// Creates the ensemble at a point, with independent germs of this seed.
     ///

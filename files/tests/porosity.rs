@@ -7,7 +7,9 @@ mod support;
 use osteon_common::bone::CaseBone;
 use osteon_common::case::Case;
 use osteon_common::elasticity::EngineeringConstants;
-use osteon_common::porosity::{BoneMatrix, Homogenisation, PoreFluid, PorosityModel};
+use osteon_common::porosity::{
+    BoneMatrix, CasePorosityModel, Homogenisation, PoreFluid, PorosityModel,
+};
 use osteon_files::case_file;
 use osteon_files::document::Format;
 
@@ -19,23 +21,22 @@ fn case(text: &str) -> Result<Case, String> {
     case_file::parse(text, Format::Toml).map_err(|error| error.to_string())
 }
 
-fn homogeneous(model: &PorosityModel, porosity: f64) -> CaseBone {
+fn homogeneous(model: &CasePorosityModel, porosity: f64) -> CaseBone {
     CaseBone::Homogeneous(model.bone(porosity).unwrap())
 }
 
 #[test]
 fn a_case_has_the_bone_of_its_porosity() {
     let read = case("bone = { porosity = 0.1 }").unwrap();
-    assert_eq!(read.bone, homogeneous(&PorosityModel::default(), 0.1));
+    assert_eq!(read.bone, homogeneous(&CasePorosityModel::default(), 0.1));
     // A whole number is a number, too, and bone without pores is the matrix.
     let read = case("bone = { porosity = 0 }").unwrap();
-    assert_eq!(read.bone, homogeneous(&PorosityModel::default(), 0.0));
+    assert_eq!(read.bone, homogeneous(&CasePorosityModel::default(), 0.0));
 }
 
 #[test]
 fn every_key_of_the_model_counts() {
-    let model = PorosityModel {
-        homogenisation: Homogenisation::SelfConsistent,
+    let model = CasePorosityModel {
         matrix: BoneMatrix {
             density: 1900.0,
             constants: EngineeringConstants {
@@ -46,14 +47,35 @@ fn every_key_of_the_model_counts() {
                 transverse_poisson_ratio: 0.4,
             },
         },
-        fluid: PoreFluid { bulk_modulus: 2.2e9, density: 950.0 },
+        model: PorosityModel {
+            homogenisation: Homogenisation::SelfConsistent,
+            fluid: PoreFluid { bulk_modulus: 2.2e9, density: 950.0 },
+        },
     };
     assert_eq!(case(EVERY_KEY).unwrap().bone, homogeneous(&model, 0.12));
     // Keys that are left out have their defaults.
     let lighter = "[bone]\nporosity = 0.2\nporosity_model = { matrix = { density = 1900 } }";
-    let mut model = PorosityModel::default();
+    let mut model = CasePorosityModel::default();
     model.matrix.density = 1900.0;
     assert_eq!(case(lighter).unwrap().bone, homogeneous(&model, 0.2));
+}
+
+#[test]
+fn a_profile_makes_sublayers_of_the_bones_thickness() {
+    let check = |given: &str, porosities: &[f64]| {
+        let text = format!(
+            "layers = {{ bone = {{ thickness = 3e-3 }} }}\nbone = {{ porosity = {given} }}"
+        );
+        let CaseBone::Layered(sublayers) = case(&text).unwrap().bone else { panic!("not layered") };
+        let solids: Vec<_> = sublayers.iter().map(|one| one.solid).collect();
+        let model = CasePorosityModel::default();
+        let expected: Vec<_> = porosities.iter().map(|&one| model.bone(one).unwrap()).collect();
+        assert_eq!(solids, expected);
+        assert!((sublayers.thickness() - 3e-3).abs() < 1e-18);
+    };
+    check("{ surface = 0.0625, marrow = 0.1875, sublayers = 2 }", &[0.09375, 0.15625]);
+    let endosteal = "{ surface = 0.05, marrow = 0.15, shape = \"endosteal\" }";
+    check(endosteal, &[0.05, 0.15]);
 }
 
 #[test]
@@ -64,14 +86,14 @@ fn sublayers_have_porosities_by_the_model_of_the_bone() {
              [[bone.sublayers]]\nthickness = 1e-3\nporosity = 0.15\n"
         )
     };
-    let mut model = PorosityModel::default();
+    let mut model = CasePorosityModel::default();
     for given in ["", "porosity_model = { homogenisation = \"self_consistent\" }"] {
         let CaseBone::Layered(sublayers) = case(&text(given)).unwrap().bone else {
             panic!("not layered");
         };
         let solids: Vec<_> = sublayers.iter().map(|one| one.solid).collect();
         assert_eq!(solids, [0.05, 0.15].map(|porosity| model.bone(porosity).unwrap()));
-        model.homogenisation = Homogenisation::SelfConsistent;
+        model.model.homogenisation = Homogenisation::SelfConsistent;
     }
     let refused = case(&text("").replace("0.15", "0.6")).unwrap_err();
     assert!(refused.contains("bone.sublayers[1].porosity: is 0.6"), "{refused}");

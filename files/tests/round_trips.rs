@@ -19,6 +19,8 @@ use osteon_common::layers::{Fluid, Layers};
 use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::{PARAMETERS, Parameter};
+use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
+use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
@@ -102,7 +104,33 @@ fn setup() -> impl Strategy<Value = Setup> {
                 },
                 picking: Picking { extremum, threshold },
                 solver,
+                pores: Pores::default(),
             }
+        },
+    )
+}
+
+/// The pores of a job's bone.
+fn pores() -> impl Strategy<Value = Pores> {
+    let shape = prop::sample::select(ProfileShape::ALL.to_vec());
+    let homogenisation = prop::sample::select(Homogenisation::ALL.to_vec());
+    let porosities = (any::<bool>(), 0.01..0.32, 0.01..0.32);
+    (porosities, shape, 2_u32..=16, homogenisation, 0.0..1e10, 0.0..1600.0).prop_map(
+        |((is_profile, one, other), shape, sublayers, homogenisation, bulk_modulus, density)| {
+            let model =
+                PorosityModel { homogenisation, fluid: PoreFluid { bulk_modulus, density } };
+            let mut pores = Pores { model, ..Pores::default() };
+            if !is_profile {
+                pores.porosity = Some(one);
+                return pores;
+            }
+            let profile =
+                PorosityProfile { surface: Some(one), marrow: Some(other), shape, sublayers };
+            pores.profile = match shape {
+                ProfileShape::Linear => profile,
+                ProfileShape::Endosteal => PorosityProfile { sublayers: 6, ..profile },
+            };
+            pores
         },
     )
 }
@@ -212,14 +240,14 @@ fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
     )
 }
 
-fn random() -> impl Strategy<Value = [(Option<f64>, RandomDistribution); 4]> {
+fn random() -> impl Strategy<Value = [(Option<f64>, RandomDistribution); 5]> {
     let distribution = prop::sample::select(RandomDistribution::ALL.to_vec());
-    prop::array::uniform4((prop::option::of(0.001..0.08), distribution))
+    prop::array::uniform5((prop::option::of(0.001..0.08), distribution))
 }
 
 /// Makes quantities random, each by a share of its mean.
 fn scattered(
-    [thickness, quality, speed, tilt]: [(Option<f64>, RandomDistribution); 4],
+    [thickness, quality, speed, tilt, porosity]: [(Option<f64>, RandomDistribution); 5],
     setup: &Setup,
 ) -> RandomQuantities {
     let scatter = |(share, distribution): (Option<f64>, RandomDistribution), mean: f64| {
@@ -235,6 +263,8 @@ fn scattered(
         bone_quality_factor: scatter(quality, quality_factor.map_or(0.0, |mean| mean - 2.0)),
         coupling_sound_speed: scatter(speed, setup.layers.coupling.sound_speed),
         probe_tilt: scatter(tilt, setup.probe.tilt),
+        porosity: scatter(porosity, setup.pores.porosity.unwrap_or(0.0)),
+        ..RandomQuantities::default()
     }
 }
 
@@ -314,7 +344,9 @@ fn job() -> impl Strategy<Value = JobSpecification> {
     );
     let objective = prop::sample::select(Objective::ALL.to_vec());
     let settings = (random(), monte_carlo(), search(), objective, posterior());
-    (any::<bool>(), setup(), data(), parameters, settings).prop_map(
+    let setup = (setup(), prop::option::of(pores()))
+        .prop_map(|(setup, pores)| Setup { pores: pores.unwrap_or_default(), ..setup });
+    (any::<bool>(), setup, data(), parameters, settings).prop_map(
         |(identification, setup, data, parameters, settings)| {
             let mut data = data;
             let (random, monte_carlo, mut search, objective, posterior) = settings;

@@ -2,10 +2,11 @@
 //! nearest to such data is a valid result, too.
 
 use osteon_common::attainable_moments::{self, AttainableMoments};
-use osteon_common::case::{Bone, Setup};
+use osteon_common::case::Setup;
 use osteon_common::job::{JobKind, JobSpecification, Range};
 use osteon_common::parameters::{PARAMETERS, Parameter, Point};
 use osteon_common::random_quantities::RandomQuantities;
+use osteon_common::realization::mean_bone;
 use osteon_common::results::Moments;
 use osteon_common::sampling::pair_count;
 use osteon_common::settings::SolverSettings;
@@ -88,9 +89,9 @@ impl ClosedFormMoments {
         let ranges = &specification.parameters;
         let (mut solver, mut workspace) = (Solver::new(setup), Workspace::default());
         let mut velocity = |point: &Point| {
-            let elasticity = point.constants().elasticity().ok()?;
-            let bone = Bone { density: point.density(), elasticity };
-            solver.change_setup(&point.setup(setup));
+            let setup = point.setup(setup);
+            let bone = mean_bone(point, &setup).ok()?;
+            solver.change_setup(&setup);
             Some(solver.arrival(&bone, &mut workspace).map(|arrival| arrival.velocity))
         };
         let slower = |one: (Point, f64), other: (Point, f64)| one.1 <= other.1;
@@ -201,13 +202,12 @@ fn of_corners(
 /// means.
 fn scatter_at_start(specification: &JobSpecification, setup: &Setup) -> f64 {
     let (start, random) = (specification.start(), &specification.random);
-    let Ok(elasticity) = start.constants().elasticity() else { return 0.0 };
-    let bone = Bone { density: start.density(), elasticity };
     let (setup, mut workspace) = (start.setup(setup), Workspace::default());
     let of_quantity = |quantity: SetupQuantity| {
         let ends = random.scatter(quantity).about(quantity.value_in(&setup)?);
         let mut velocity = |value| {
-            let solver = Solver::new(&quantity.with(value, setup));
+            let setup = quantity.with(value, setup);
+            let (solver, bone) = (Solver::new(&setup), mean_bone(&start, &setup).ok()?);
             solver.arrival(&bone, &mut workspace).ok().map(|arrival| arrival.velocity)
         };
         let (below, above) = (velocity(ends[0])?, velocity(ends[1])?);

@@ -1,6 +1,7 @@
 //! How many evaluations a job will probably take, before any of them is made.
 
 use osteon_common::job::{Data, JobKind, JobSpecification, SearchMethod};
+use osteon_common::parameters::Parameter;
 
 /// Evaluations of the simplex: a number, and so many more for each free parameter. Searches of seven
 /// parameters take some 120 to 250, of two some 50 to 100.
@@ -42,9 +43,11 @@ impl ExpectedEvaluations {
 fn searched(specification: &JobSpecification, end: usize) -> u64 {
     let search = &specification.search;
     let free = specification.free().count() as u64;
+    let is_unknown =
+        |one: &Parameter| one.of_setup().is_some() && !Parameter::OF_PORES.contains(one);
     // What no closed form tells of is measured at the first point.
     let unknown = match specification.observables().is_empty() {
-        true => specification.free().filter(|one| one.of_setup().is_some()).count() as u64,
+        true => specification.free().filter(is_unknown).count() as u64,
         false => free,
     };
     let each = |evaluations: u64| evaluations.min(search.max_evaluations);

@@ -116,7 +116,7 @@ pub struct Newton {
     settings: Settings,
     data: ComparedMoments,
     /// The first axis whose slopes are always measured: that of a parameter of the setup, which all come
-    /// last, because the closed form does not contain them; or the first of all, because it does not
+    /// last, because the closed form does not contain them (but porosities); or the first of all, because it does not
     /// contain other observables.
     first_unknown: usize,
     /// Point from which distances are measured: the start, later a point near the solution.
@@ -157,7 +157,7 @@ impl Newton {
         let mut newton = Self {
             settings,
             data,
-            first_unknown: if has_observables { 0 } else { space.first_of_setup() },
+            first_unknown: if has_observables { 0 } else { space.first_unknown() },
             model: Model::new(space, start.clone(), rule),
             weights: None,
             base: None,

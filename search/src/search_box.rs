@@ -4,11 +4,13 @@
 use osteon_common::ensemble::DISPERSION_MAX;
 use osteon_common::job::{ON_BOUND, Range};
 use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Parameter, Point};
+use osteon_common::pores::Pores;
 
 /// The ranges within which a search moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchBox {
     ranges: [Range; PARAMETERS],
+    pores: Pores,
 }
 
 /// The bound of a parameter on which a point lies.
@@ -24,7 +26,23 @@ impl SearchBox {
     /// Creates the box of these ranges, which are in the order of [`Parameter::ALL`] and have been
     /// checked.
     pub fn new(ranges: [Range; PARAMETERS]) -> Self {
-        Self { ranges }
+        Self { ranges, pores: Pores::default() }
+    }
+
+    /// Returns the box for bones with these pores.
+    #[must_use]
+    pub fn with_pores(self, pores: Pores) -> Self {
+        Self { pores, ..self }
+    }
+
+    /// Returns the pores of the setup; a point may have porosities of its own.
+    pub(crate) fn pores(&self) -> &Pores {
+        &self.pores
+    }
+
+    /// Returns whether realizations can be drawn at a point.
+    pub fn admits(&self, point: &Point) -> bool {
+        admissible(&self.pores, point)
     }
 
     /// Returns the coordinates of the start.
@@ -32,17 +50,18 @@ impl SearchBox {
         self.ranges.iter().filter_map(unit_start).collect()
     }
 
-    /// Returns the first coordinate of a parameter of the setup; the number of coordinates if there is
-    /// none.
-    pub fn first_of_setup(&self) -> usize {
-        let of_bone = self.ranges.iter().take(BONE_PARAMETERS);
-        of_bone.filter(|range| matches!(range, Range::Free { .. })).count()
+    /// Returns the first coordinate that √(c1111/ρ) and the dispersion do not depend on, as those of other
+    /// parameters of the setup; the number of coordinates if there is none.
+    pub fn first_unknown(&self) -> usize {
+        let known = self.ranges.iter().take(BONE_PARAMETERS + Parameter::OF_PORES.len());
+        known.filter(|range| matches!(range, Range::Free { .. })).count()
     }
 
     /// Returns the box with its start at these coordinates; surplus coordinates are ignored.
     pub fn started_at(&self, coordinates: &[f64]) -> Self {
         let mut coordinates = coordinates.iter();
         Self {
+            pores: self.pores,
             ranges: self.ranges.map(|range| match range {
                 Range::Fixed(_) => range,
                 Range::Free { lower, upper, start } => match coordinates.next() {
@@ -95,14 +114,10 @@ impl SearchBox {
     }
 }
 
-/// Returns whether realizations can be drawn at `point`.
-pub fn admissible(point: &Point) -> bool {
+/// Returns whether realizations can be drawn at `point`, of a bone with these pores.
+pub fn admissible(pores: &Pores, point: &Point) -> bool {
     let dispersion = point.dispersion();
-    point.density() > 0.0
-        && point.density().is_finite()
-        && dispersion > 0.0
-        && dispersion < DISPERSION_MAX
-        && point.constants().elasticity().is_ok()
+    dispersion > 0.0 && dispersion < DISPERSION_MAX && pores.mean_solid(point).is_ok()
 }
 
 fn unit_start(range: &Range) -> Option<f64> {

@@ -6,7 +6,7 @@ use osteon_common::bone::BoneRef;
 use osteon_common::case::Setup;
 use osteon_common::observables::{Observable, ObservableSet, PerObservable};
 use osteon_common::outcome::{FailureKind, RealizationResult};
-use osteon_common::realization::Ensemble;
+use osteon_common::realization::{Ensemble, Realization};
 use osteon_common::settings::{Extremum, Picking};
 
 use crate::arrival::Arrival;
@@ -68,8 +68,9 @@ impl Solver {
         index: u64,
         workspace: &mut Workspace,
     ) -> Result<RealizationResult, FailureKind> {
-        let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
-        let own = ensemble.own_setup(index, self.setup()).map(|own| self.with_setup(&own));
+        let realization = ensemble.realization(index, self.setup());
+        let Realization { own_setup, bone } = realization.map_err(|_| FailureKind::NotFinite)?;
+        let own = own_setup.map(|own| self.with_setup(&own));
         let solver = own.as_ref().unwrap_or(self);
         let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
         let needs_other =
@@ -104,8 +105,9 @@ impl Solver {
         index: u64,
         workspace: &mut Workspace,
     ) -> Result<ObservedRealization, FailureKind> {
-        let bone = ensemble.bone(index).map_err(|_| FailureKind::NotFinite)?;
-        let own = ensemble.own_setup(index, self.setup()).map(|own| self.with_setup(&own));
+        let realization = ensemble.realization(index, self.setup());
+        let Realization { own_setup, bone } = realization.map_err(|_| FailureKind::NotFinite)?;
+        let own = own_setup.map(|own| self.with_setup(&own));
         let solver = own.as_ref().unwrap_or(self);
         let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
         let signal = solver.first_signal(&bone, &arrival, workspace);

@@ -68,19 +68,24 @@ impl Solver {
 
     /// Returns a solver for another setup. It shares this one's tables if the setup has the same.
     pub(crate) fn with_setup(&self, setup: &Setup) -> Self {
+        self.sharing_tables(setup).unwrap_or_else(|| Self::with_isa(setup, self.isa))
+    }
+
+    /// Returns a solver for another setup that shares this one's tables; `None` if the setup has others.
+    pub fn sharing_tables(&self, setup: &Setup) -> Option<Self> {
         if !has_tables_of(setup, &self.setup) {
-            return Self::with_isa(setup, self.isa);
+            return None;
         }
         let reversed = self.reversed.as_ref().map(|exact| {
             exact.with_setup(&Setup { probe: setup.probe.from_other_side(), ..*setup })
         });
-        Self {
+        Some(Self {
             setup: *setup,
             isa: self.isa,
             exact: self.exact.with_setup(setup),
             reversed,
             hybrid: Hybrid::with_isa(setup, self.isa),
-        }
+        })
     }
 
     /// Returns the setup.

@@ -5,7 +5,7 @@
 use osteon_common::bone::{Sublayer, Sublayers};
 use osteon_common::case::{Bone, Setup};
 use osteon_common::elasticity::EngineeringConstants;
-use osteon_common::porosity::{BoneMatrix, Homogenisation, PorosityModel};
+use osteon_common::porosity::{BoneMatrix, CasePorosityModel, Homogenisation};
 use osteon_solver::{Solver, Workspace};
 
 /// Returns velocities of the first arriving signal in a plate of 4 mm, m/s.
@@ -16,13 +16,13 @@ fn velocities<const N: usize>(bones: [Bone; N]) -> [f64; N] {
 }
 
 /// Returns by how much the velocity falls for one per cent more of pores, m/s, about 10 %.
-fn fall(model: &PorosityModel) -> f64 {
+fn fall(model: &CasePorosityModel) -> f64 {
     let [more, less] = velocities([0.15, 0.05].map(|porosity| model.bone(porosity).unwrap()));
     (less - more) / 10.0
 }
 
 /// Returns a model whose matrix has the density of usual bone.
-fn model_of_usual_density() -> PorosityModel {
+fn model_of_usual_density() -> CasePorosityModel {
     let constants = EngineeringConstants {
         longitudinal_young_modulus: 22e9,
         longitudinal_poisson_ratio: 0.35,
@@ -31,12 +31,12 @@ fn model_of_usual_density() -> PorosityModel {
         transverse_poisson_ratio: 0.4,
     };
     let matrix = BoneMatrix { density: 1900.0, constants };
-    PorosityModel { matrix, ..PorosityModel::default() }
+    CasePorosityModel { matrix, ..CasePorosityModel::default() }
 }
 
 /// Returns by how much a plate of six sublayers, whose porosities rise linearly from the skin's side to the
 /// marrow's, is faster than a homogeneous one of their mean porosity, m/s.
-fn gain_of_gradient(model: &PorosityModel, thickness: f64, [from, to]: [f64; 2]) -> f64 {
+fn gain_of_gradient(model: &CasePorosityModel, thickness: f64, [from, to]: [f64; 2]) -> f64 {
     let sublayers: Vec<_> = (0..6)
         .map(|i| {
             let porosity = (to - from).mul_add((f64::from(i) + 0.5) / 6.0, from);
@@ -72,10 +72,10 @@ fn a_gradient_is_faster_than_its_mean_in_a_thick_plate_only() {
 /// velocity falls.
 #[test]
 fn the_velocity_falls_with_the_porosity() {
-    let mut model = PorosityModel::default();
+    let mut model = CasePorosityModel::default();
     let by_default = fall(&model);
     assert!((by_default - 18.3).abs() < 0.1, "{by_default} m/s");
-    model.homogenisation = Homogenisation::SelfConsistent;
+    model.model.homogenisation = Homogenisation::SelfConsistent;
     let around_bone = fall(&model);
     assert!((around_bone - 20.5).abs() < 0.1, "{around_bone} m/s");
     let of_usual_density = fall(&model_of_usual_density());
@@ -86,6 +86,6 @@ fn the_velocity_falls_with_the_porosity() {
 /// leave an uncertainty of a few millionths.
 #[test]
 fn a_tenth_of_pores_has_the_velocity_of_the_papers_optimum() {
-    let [velocity] = velocities([PorosityModel::default().bone(0.1).unwrap()]);
+    let [velocity] = velocities([CasePorosityModel::default().bone(0.1).unwrap()]);
     assert!((velocity / 3908.77 - 1.0).abs() < 1e-5, "{velocity} m/s");
 }

@@ -3,6 +3,7 @@
 use anyhow::anyhow;
 use osteon_common::case::Case;
 use osteon_common::job::JobKind;
+use osteon_common::realization::Realization;
 use osteon_files::{case_file, job_file};
 
 use crate::arguments::DrawArguments;
@@ -27,13 +28,14 @@ pub(super) fn draw(arguments: &DrawArguments) -> Ended {
     }
     let point = job_point::chosen(&arguments.place, &input, &specification)?;
     let ensemble = specification.ensemble(&point).map_err(CommandFailure::bad_input)?;
-    let bone = ensemble.bone(index).map_err(|error| {
+    let drawn = ensemble.realization(index, &specification.setup).map_err(|error| {
         CommandFailure::failed(anyhow::Error::new(error).context(format!(
             "realization {index} has no finite elasticity matrix (failure not_finite)"
         )))
     })?;
-    let setup = ensemble.setup(index, &specification.setup);
-    let text = case_file::to_toml(&Case { setup, bone: bone.into() });
+    let Realization { own_setup, bone } = drawn;
+    let setup = own_setup.unwrap_or(specification.setup);
+    let text = case_file::to_toml(&Case { setup, bone });
     output::stdout(OutputFormat::Text).verbatim(&text).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }

@@ -145,6 +145,7 @@ fn population() -> Surroundings {
         bone_quality_factor: scatter(2.0, RandomDistribution::LogNormal),
         coupling_sound_speed: scatter(15.0, RandomDistribution::Uniform),
         probe_tilt: scatter(0.5_f64.to_radians(), RandomDistribution::Normal),
+        ..RandomQuantities::default()
     };
     Surroundings { setup, random }
 }

@@ -2,8 +2,9 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::case::Setup;
 use osteon_common::parameters::Point;
+use osteon_common::realization::mean_bone;
 use osteon_solver::{Isa, Solver, Workspace};
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
@@ -34,14 +35,13 @@ impl CaseSolver {
         point: &Point,
         setup: &Setup,
     ) -> Result<f64, ProtocolError> {
-        let elasticity = point.constants().elasticity();
-        let elasticity = elasticity.map_err(|error| ProtocolError {
+        let setup = point.setup(setup);
+        let bone = mean_bone(point, &setup).map_err(|error| ProtocolError {
             no_value: true,
             ..ProtocolError::input(format!("input[0]: {error}"))
         })?;
-        let bone = Bone { density: point.density(), elasticity };
         let _core = self.cores.acquire().await;
-        let solver = self.solver(&point.setup(setup));
+        let solver = self.solver(&setup);
         let solved = spawn_blocking(move || solver.arrival(&bone, &mut Workspace::default())).await;
         match solved {
             Ok(Ok(arrival)) => Ok(arrival.velocity),

@@ -168,14 +168,17 @@ impl Solvers {
     }
 
     /// Returns the solver of `setup`, which is created once even if several batches request it at
-    /// the same time.
+    /// the same time, and shares the tables of a kept one if it can.
     fn get(&self, setup: &Setup) -> Arc<Solver> {
         // A panic while the lock is held leaves no half-finished entry in the queue.
         let mut solvers = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let known = solvers.iter().position(|solver| solver.setup() == setup);
         let solver = match known.and_then(|position| solvers.remove(position)) {
             Some(solver) => solver,
-            None => Arc::new(Solver::with_isa(setup, self.isa)),
+            None => {
+                let sharing = solvers.iter().find_map(|solver| solver.sharing_tables(setup));
+                Arc::new(sharing.unwrap_or_else(|| Solver::with_isa(setup, self.isa)))
+            }
         };
         solvers.truncate(SOLVERS_MAX - 1);
         solvers.push_front(Arc::clone(&solver));

@@ -85,7 +85,7 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
         return;
     }
     let pores = &specification.setup.pores;
-    if let Err(inadmissible) = pores.mean_bone(&specification.start()) {
+    if let Err(inadmissible) = pores.mean_solid(&specification.start()) {
         violations.add(
             "parameters",
             format!("the point of starts and fixed values is not admissible: {inadmissible}"),

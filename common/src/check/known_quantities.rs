@@ -25,6 +25,9 @@ pub(super) fn known_quantities(
     {
         return;
     }
+    let has = |parameter: Parameter| {
+        parameter.of_setup().is_some_and(|one| one.value_in(&specification.setup).is_some())
+    };
     for (set, group) in data.groups().iter().enumerate() {
         for parameter in Parameter::OF_SETUP {
             let field = field(parameter, group, origin);
@@ -43,6 +46,10 @@ pub(super) fn known_quantities(
                     "is known of each group, and parameters.{} is searched; leave one of them out",
                     parameter.name()
                 );
+                return violations.add(field, message);
+            } else if known && Parameter::OF_PORES.contains(&parameter) && !has(parameter) {
+                let message = "is known of each group, and the job's bone has no such porosity; give one in \
+                               `bone`";
                 return violations.add(field, message);
             }
         }

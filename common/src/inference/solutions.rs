@@ -41,7 +41,7 @@ pub fn spread(points: &[Point], pores: &Pores) -> Option<Spreads> {
         |(parameter, _)| (parameter, of(&mut points.iter().map(|point| point.get(parameter))));
     let parameters = first.given().map(of_parameter).collect();
     // Points that were evaluated are always admissible.
-    let mean = |point: &Point| Some(pores.mean_bone(point).ok()?.elasticity);
+    let mean = |point: &Point| Some(pores.mean_solid(point).ok()?.elasticity);
     let matrices: Vec<Elasticity> = points.iter().filter_map(mean).collect();
     let entries = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
     let entries =

@@ -44,7 +44,7 @@ fn a_point_overrides_the_porosities_of_the_setup() {
 #[test]
 fn without_pores_the_mean_bone_is_the_mean_model() {
     let (point, pores) = (matrix(), Pores::default());
-    let bone = pores.mean_bone(&point).unwrap();
+    let bone = pores.mean_solid(&point).unwrap();
     assert_eq!((bone.density, Ok(bone.elasticity)), (1665.33, point.constants().elasticity()));
     assert_eq!(pores.bulk_velocity(&point).unwrap(), bulk_velocity(&point).unwrap());
 }
@@ -100,7 +100,7 @@ fn each_solid_is_realized_and_the_thicknesses_are_equal() {
     else {
         panic!("one porosity makes one solid");
     };
-    assert_eq!(bone.density, pores.mean_bone(&point).unwrap().density + 1.0);
+    assert_eq!(bone.density, pores.mean_solid(&point).unwrap().density + 1.0);
     let pores = profile(0.05, 0.15, ProfileShape::Linear, 8);
     let CaseBone::Layered(layers) = pores.bone(&point.mean_model(), 4e-3, realize).unwrap() else {
         panic!("a profile makes sublayers");

@@ -38,7 +38,7 @@ pub(super) fn bone(
     if is_wrong(reader, &path) {
         return None;
     }
-    let bone = model.model.bone(&model.matrix, porosity);
+    let bone = model.bone(porosity);
     bone.map_err(|none| reader.violations.add(path, format!("is {porosity:?}; {none}"))).ok()
 }
 

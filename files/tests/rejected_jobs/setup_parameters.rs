@@ -33,6 +33,36 @@ fn setup_parameters() {
     check("rejected_setup_parameters", JobKind::Identification, &edits);
 }
 
+#[test]
+fn pores() {
+    let bone = |keys: &str| (FIRST, format!("[bone]\n{keys}\n\n{FIRST}"));
+    let edits = [
+        bone("porosity = 0.0"),
+        bone("porosity = 10.0"),
+        bone("porosity = 0.5"),
+        bone("porosity = { surface = 0.05 }"),
+        bone("porosity = {}"),
+        bone("porosity = { surface = 0.05, marrow = 0.6 }"),
+        bone("porosity = { surface = 0.05, marrow = 0.1, sublayers = 17 }"),
+        bone("porosity = { surface = 0.05, marrow = 0.1, shape = \"endosteal\", sublayers = 4 }"),
+        bone("porosity = { surface = 0.05, marrow = 0.1, shape = \"quadratic\" }"),
+        bone("porosity_model = { homogenisation = \"self_consistent\" }"),
+        bone("porosity = 0.1\nporosity_model = { matrix = { density = 1900.0 } }"),
+        bone("porosity = 0.1\ndensity = 1800.0"),
+        bone(
+            "porosity = 0.4\nporosity_model = { homogenisation = \"self_consistent\", fluid = { bulk_modulus = 0 } }",
+        ),
+        with("porosity", "bounds = [0.05, 0.2]"),
+        bone("porosity = 0.1\n[parameters.porosity]\nbounds = [0.0, 0.2]"),
+        bone("porosity = 0.1\n[parameters.porosity]\nbounds = [5, 20]\nstart = 10"),
+        bone("porosity = 0.1\n[parameters.marrow_porosity]\nbounds = [0.05, 0.2]"),
+        bone("porosity = 0.1\n[random.porosity]\nstandard_deviation = 0.03"),
+        bone("porosity = 0.1\n[parameters]\nmaterial = \"human-tibia-rho-1996\""),
+    ];
+    let edits: Vec<(&str, &str)> = edits.iter().map(|(from, to)| (*from, to.as_str())).collect();
+    check("rejected_pores", JobKind::Identification, &edits);
+}
+
 /// `known` is of the group `b`; `a` has a thickness of 3 mm.
 #[test]
 fn known_quantities_of_groups() {

@@ -2,7 +2,7 @@
 
 use osteon_common::job::{JobKind, JobSpecification, Range};
 use osteon_common::parameters::{PARAMETERS, Parameter, Point};
-use osteon_search::search_box::{SearchBox, admissible};
+use osteon_search::search_box::SearchBox;
 
 /// Maximum number of points of the sequence that are tried for each one that is admissible.
 const TRIED_MAX: usize = 16;
@@ -22,13 +22,13 @@ pub(super) fn points(specification: &JobSpecification, count: usize) -> Vec<Poin
         return points;
     }
     points.push(slowest_corner(&ranges));
-    let space = SearchBox::new(ranges);
+    let space = SearchBox::new(ranges).with_pores(specification.setup.pores);
     let sequence = EvenSequence::new(free);
     let tried = (1..=TRIED_MAX * count).map(|number| space.point(&sequence.coordinates(number)));
     points.extend(tried);
     let mut kept = points.into_iter();
     let start = kept.next();
-    let of_box = kept.filter(admissible).take(count);
+    let of_box = kept.filter(|point| space.admits(point)).take(count);
     start.into_iter().chain(of_box).collect()
 }
 

@@ -14,13 +14,12 @@
 
 use std::array;
 
-use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::ensemble::Germs;
 use osteon_common::inference::MomentWeights;
 use osteon_common::moments::{MOMENTS, MomentVector};
 use osteon_common::parameters::{PARAMETERS, Parameter};
 
-use crate::search_box::{SearchBox, admissible};
+use crate::search_box::SearchBox;
 
 use super::nearest::{Rows, dot, nearest, norm};
 
@@ -262,7 +261,7 @@ impl Model {
         for _ in 0..HALVINGS_MAX {
             let to: Vec<f64> =
                 from.iter().zip(step).map(|(u, d)| (u + share * d).clamp(0.0, 1.0)).collect();
-            if admissible(&self.space.point(&to)) {
+            if self.space.admits(&self.space.point(&to)) {
                 return to;
             }
             share *= 0.5;
@@ -287,7 +286,7 @@ impl Model {
 /// coordinates.
 fn closed_form(space: &SearchBox, at: &[f64]) -> Option<(MomentVector, Rows)> {
     let point = space.point(at);
-    let velocity = bulk_velocity(&point).ok()?;
+    let velocity = space.pores().bulk_velocity(&point).ok()?;
     let dispersion = point.dispersion();
     let mut of_dispersion = [0.0; PARAMETERS];
     of_dispersion[Parameter::Dispersion as usize] = 1.0 / dispersion;

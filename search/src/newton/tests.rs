@@ -5,6 +5,7 @@ use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::ensemble::Germs;
 use osteon_common::job::Range;
 use osteon_common::parameters::{Parameter, Point};
+use osteon_common::pores::Pores;
 use osteon_common::statistics;
 use osteon_fuzz::properties;
 use proptest::prelude::*;
@@ -115,7 +116,7 @@ fn finish(
         };
         assert!(pending.iter().all(|u| (0.0..=1.0).contains(u)), "outside the box: {pending:?}");
         let point = space.point(&pending);
-        if !admissible(&point) {
+        if !admissible(&Pores::default(), &point) {
             newton.refuse();
             continue;
         }
@@ -171,7 +172,7 @@ fn a_bone_is_found_in_a_few_evaluations() {
     let mut evaluations = Vec::new();
     for start in drawn.chain([hard]) {
         let space = all_free(&start);
-        if !admissible(&space.point(&space.start())) {
+        if !admissible(&Pores::default(), &space.point(&space.start())) {
             continue;
         }
         let found = search(space, bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
@@ -194,7 +195,7 @@ fn a_search_from_the_solution_of_the_closed_form_takes_fewer_evaluations() {
     for index in 0..100 {
         let germs = Germs::draw(18, index);
         let space = all_free(&std::array::from_fn(|axis| germs.values()[axis]));
-        if !admissible(&space.point(&space.start())) {
+        if !admissible(&Pores::default(), &space.point(&space.start())) {
             continue;
         }
         let usual = search(space, data, SETTINGS, |point| Some(bone(point)));
@@ -221,7 +222,7 @@ properties! {
     /// there by central differences of the moments themselves.
     fn the_answer_is_the_nearest_to_the_start(start in unit()) {
         let space = all_free(&start);
-        prop_assume!(admissible(&space.point(&space.start())));
+        prop_assume!(admissible(&Pores::default(), &space.point(&space.start())));
         let found = search(space, bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
         let (off, distance) = off_nearest(space, &found.at, &bone);
         // The largest of 2000 starts was 4.6 %, the median 1.1 %.
@@ -231,7 +232,7 @@ properties! {
     /// If the closed form is exact, there is nothing to learn: one step reaches the point.
     fn where_the_rule_holds_the_answer_is_exact(start in unit()) {
         let space = all_free(&start);
-        prop_assume!(admissible(&space.point(&space.start())));
+        prop_assume!(admissible(&Pores::default(), &space.point(&space.start())));
         let found = search(space, rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
         prop_assert_eq!(found.stop, StopReason::CostReached);
         let (off, _) = off_nearest(space, &found.at, &rule);
@@ -446,7 +447,7 @@ fn the_points_that_measure_slopes_are_foreseen() {
     let (mut foreseen, mut asked) = (Vec::<Vec<f64>>::new(), 0);
     while let Proposal::Evaluate(pending) = newton.ask() {
         let pending = pending.to_vec();
-        if !admissible(&space.point(&pending)) {
+        if !admissible(&Pores::default(), &space.point(&pending)) {
             newton.refuse();
             foreseen.clear();
             continue;

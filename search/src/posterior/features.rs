@@ -6,8 +6,8 @@
 //! 200 points the interpolated mean velocity was off by more than 3.7 data errors (of 2747
 //! velocities) at a twentieth of the test points in these, and by more than 0.7 in the ratios.
 
-use osteon_common::bulk_velocity::bulk_velocity;
-use osteon_common::parameters::{AS_IN_SETUP, BONE_PARAMETERS, PARAMETERS, Point};
+use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Parameter, ParameterScale, Point};
+use osteon_common::pores::Pores;
 
 /// Number of features.
 pub(super) const FEATURES: usize = PARAMETERS;
@@ -16,12 +16,17 @@ pub(super) const FEATURES: usize = PARAMETERS;
 pub(super) type Features = [f64; FEATURES];
 
 /// Returns c3333/c1111, c1133/c1111, g_L/c1111, ln ρ, c2233/c3333, ln(c1111/ρ) and
-/// ln δ of the mean model at a point, and the logarithms of the parameters of the setup, or 0 if they
-/// are not searched; `None` where the model is not admissible.
-pub(super) fn features(point: &Point) -> Option<Features> {
-    let velocity = bulk_velocity(point).ok()?;
-    let [density, e_l, nu_l, g_l, e_t, nu_t, dispersion, of_setup @ ..] = point.0;
-    let of_setup = of_setup.map(|value| if value == AS_IN_SETUP { 0.0 } else { libm::log(value) });
+/// ln δ of the mean model at a point, and of the parameters of the setup the porosities and the logarithms
+/// of the others, or 0 if they are not searched; `None` where the model is not admissible. With `pores`,
+/// ln(c1111/ρ) is that of the porous bone, and the ratios are those between the pores.
+pub(super) fn features(pores: &Pores, point: &Point) -> Option<Features> {
+    let bulk_logarithm = pores.bulk_logarithm(point).ok()?;
+    let [density, e_l, nu_l, g_l, e_t, nu_t, dispersion, ..] = point.0;
+    let of_setup = Parameter::OF_SETUP.map(|parameter| match parameter.row().scale {
+        _ if !point.has(parameter) => 0.0,
+        ParameterScale::Linear => point.get(parameter),
+        ParameterScale::Logarithmic => libm::log(point.get(parameter)),
+    });
     // Entries of the inverse of the compliance, with the axis of symmetry 1, over common factors.
     let ratio = e_t / e_l * (nu_l * nu_l);
     let margin = 1.0 - nu_t - 2.0 * ratio;
@@ -37,7 +42,7 @@ pub(super) fn features(point: &Point) -> Option<Features> {
                 g_l / c11,
                 libm::log(density),
                 c23 / c33,
-                2.0 * velocity.logarithm,
+                2.0 * bulk_logarithm,
                 libm::log(dispersion),
             ],
             of_setup,
@@ -75,12 +80,15 @@ mod tests {
             libm::log(rows[0][0] / 1598.8),
             libm::log(0.1029),
             0.0,
+            0.0,
+            0.0,
+            0.0,
             libm::log(15.0),
             0.0,
         ];
         let mut point = point;
         point.0[Parameter::BoneQualityFactor as usize] = 15.0;
-        let found = features(&point).unwrap();
+        let found = features(&Pores::default(), &point).unwrap();
         for (found, expected) in found.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }

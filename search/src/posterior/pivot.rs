@@ -7,6 +7,7 @@
 
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::parameters::{PARAMETERS, Parameter, Point};
+use osteon_common::pores::Pores;
 
 use super::prior::ParameterPrior;
 
@@ -22,11 +23,12 @@ pub(super) struct Pivots {
 
 impl Pivots {
     /// Chooses the pivots among the free parameters: for the mean velocity the one whose prior
-    /// leaves it most uncertain, at the point `at` of the other medians. The longitudinal Young
+    /// leaves it most uncertain, at the point `at` of the other medians, of a bone with these pores. The longitudinal Young
     /// modulus is chosen only if there is no other, because up to two of its values give the same
     /// velocity.
-    pub(super) fn choose(priors: &[ParameterPrior], at: &Point) -> Self {
-        let gradient = bulk_velocity(at).map_or([1.0; PARAMETERS], |velocity| velocity.gradient);
+    pub(super) fn choose(priors: &[ParameterPrior], pores: &Pores, at: &Point) -> Self {
+        let gradient =
+            pores.bulk_velocity(at).map_or([1.0; PARAMETERS], |velocity| velocity.gradient);
         let free = priors.iter().filter(|prior| is_in_closed_form(prior.parameter));
         let influence = |prior: &&ParameterPrior| {
             let whole = (gradient[prior.parameter as usize] * prior.middle_half()).abs();
@@ -55,14 +57,34 @@ impl Pivots {
 /// Returns whether √(c1111/ρ) depends on a parameter.
 fn is_in_closed_form(parameter: Parameter) -> bool {
     let others = [Parameter::Dispersion, Parameter::LongitudinalShearModulus];
-    parameter.of_setup().is_none() && !others.contains(&parameter)
+    let is_known = parameter.of_setup().is_none() || Parameter::OF_PORES.contains(&parameter);
+    is_known && !others.contains(&parameter)
 }
 
-/// Returns the value of `pivot` with which `point` has this ln √(c1111/ρ), by the paper's Eq. (7).
-/// Where there is none, c1111 is larger than wanted everywhere: then the value with which it is
+/// Returns the value of `pivot` with which `point` has this ln √(c1111/ρ), of a bone with these pores, or
+/// nearly that value if the bone has any: a few repetitions from the value found make it exact.
+pub(super) fn solve(
+    pores: &Pores,
+    point: &Point,
+    pivot: Parameter,
+    logarithm: f64,
+    branch: usize,
+) -> Option<f64> {
+    if Parameter::OF_PORES.contains(&pivot) {
+        let slope = pores.bulk_slope(point, pivot).ok()?;
+        let step = (logarithm - pores.bulk_logarithm(point).ok()?) / slope;
+        return Some(point.get(pivot) + step).filter(|value| value.is_finite());
+    }
+    // The pores change the logarithm by an amount that hardly depends on the pivot.
+    let by_pores = pores.bulk_logarithm(point).ok()? - bulk_velocity(point).ok()?.logarithm;
+    solve_solid(point, pivot, logarithm - by_pores, branch)
+}
+
+/// Returns the value of `pivot` with which `point` has this ln √(c1111/ρ), by the paper's Eq. (7), of a bone
+/// without pores. Where there is none, c1111 is larger than wanted everywhere: then the value with which it is
 /// smallest, without regard to bounds. `None` if the point is not admissible with any density. Of two
 /// values `branch` 0 is the larger.
-pub(super) fn solve(point: &Point, pivot: Parameter, logarithm: f64, branch: usize) -> Option<f64> {
+fn solve_solid(point: &Point, pivot: Parameter, logarithm: f64, branch: usize) -> Option<f64> {
     let [density, e_l, nu_l, _, e_t, nu_t, ..] = point.0;
     let stiffness = density * libm::exp(2.0 * logarithm);
     let (a, b) = (1.0 - nu_t, 2.0 * e_t * nu_l * nu_l);
@@ -103,7 +125,7 @@ mod tests {
             Parameter::TransversePoissonRatio,
         ] {
             let wanted = bulk_velocity(&OPTIMUM).unwrap().logarithm + 0.005;
-            let value = solve(&OPTIMUM, pivot, wanted, 0).unwrap();
+            let value = solve_solid(&OPTIMUM, pivot, wanted, 0).unwrap();
             let mut point = OPTIMUM;
             point.0[pivot as usize] = value;
             let found = bulk_velocity(&point).unwrap().logarithm;
@@ -115,7 +137,7 @@ mod tests {
     fn two_longitudinal_moduli_may_have_one_velocity() {
         let wanted = bulk_velocity(&OPTIMUM).unwrap().logarithm;
         let pivot = Parameter::LongitudinalYoungModulus;
-        let both = [0, 1].map(|branch| solve(&OPTIMUM, pivot, wanted, branch).unwrap());
+        let both = [0, 1].map(|branch| solve_solid(&OPTIMUM, pivot, wanted, branch).unwrap());
         assert!(both[0] > both[1]);
         assert!((both[0] / 17.717e9 - 1.0).abs() < 1e-12, "{both:?}");
     }

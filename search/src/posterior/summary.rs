@@ -5,6 +5,7 @@ use osteon_common::data_statistics::{FittedMoments, predictive_test};
 use osteon_common::job::JobSpecification;
 use osteon_common::moments::MomentVector;
 use osteon_common::parameters::{Parameter, Point};
+use osteon_common::pores::Pores;
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
 use osteon_common::results::{BestPoint, Moments};
 
@@ -40,8 +41,10 @@ impl PosteriorSearch {
         let prior = problem.prior_points(PRIOR_POINTS);
         let of = |quantity: &dyn Fn(&Point) -> f64| summary(&population, &prior, quantity);
         let free: Vec<Parameter> = problem.priors.iter().map(|prior| prior.parameter).collect();
-        let (mean, variation) =
-            (of(&|point| self.moment(point, 0)), of(&|point| self.moment(point, 1)));
+        let (mean, variation) = (
+            of(&|point| self.moment(problem, point, 0)),
+            of(&|point| self.moment(problem, point, 1)),
+        );
         let at = [mean.mean, variation.mean].map(libm::log);
         let settings = specification.posterior.unwrap_or_default();
         let count = usize::try_from(settings.draws).unwrap_or(usize::MAX);
@@ -61,9 +64,9 @@ impl PosteriorSearch {
             mean,
             coefficient_of_variation: variation,
             bulk_velocity: of(&|point| {
-                closed_form(point).map_or(f64::NAN, |closed| libm::exp(closed[0]))
+                closed_form(&problem.pores, point).map_or(f64::NAN, |closed| libm::exp(closed[0]))
             }),
-            entries: entries(&population, &prior),
+            entries: entries(&population, &prior, &problem.pores),
             predictive_p_value: None,
             outlier_share: problem.likelihood.velocities.outlier_share(at).map(|share| share.mean),
             draws: draws(&population, problem, count),
@@ -81,8 +84,9 @@ impl PosteriorSearch {
     }
 
     /// Returns mean or coefficient of variation of the interpolated model.
-    fn moment(&self, point: &Point, axis: usize) -> f64 {
-        moments_of(&self.surrogate, point).map_or(f64::NAN, |found| libm::exp(found[axis]))
+    fn moment(&self, problem: &PosteriorProblem, point: &Point, axis: usize) -> f64 {
+        moments_of(&self.surrogate, &problem.pores, point)
+            .map_or(f64::NAN, |found| libm::exp(found[axis]))
     }
 
     /// Returns why the result is not accurate; `None` if it is.
@@ -219,10 +223,14 @@ fn correlation(population: &Population, free: &[Parameter]) -> Vec<Vec<f64>> {
     columns.iter().map(row).collect()
 }
 
-fn entries(population: &Population, prior: &[Point]) -> Vec<(usize, usize, PosteriorSummary)> {
+fn entries(
+    population: &Population,
+    prior: &[Point],
+    pores: &Pores,
+) -> Vec<(usize, usize, PosteriorSummary)> {
     let entry = |point: &Point, row: usize, column: usize| {
-        let elasticity = point.constants().elasticity();
-        elasticity.map_or(f64::NAN, |elasticity| elasticity.rows()[row][column])
+        let solid = pores.mean_solid(point);
+        solid.map_or(f64::NAN, |solid| solid.elasticity.rows()[row][column])
     };
     let places = (0..6).flat_map(|row| (row..6).map(move |column| (row, column)));
     places

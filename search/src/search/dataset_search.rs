@@ -156,7 +156,8 @@ impl DatasetSearch {
         }
         if self.differences.is_empty() {
             let candidates = self.method.candidates(most);
-            return candidates.iter().map(|at| self.space.point(at)).filter(admissible).collect();
+            let points = candidates.iter().map(|at| self.space.point(at));
+            return points.filter(|point| self.space.admits(point)).collect();
         }
         self.differences.iter().rev().skip(1).take(most).map(|(_, point)| *point).collect()
     }
@@ -315,7 +316,7 @@ impl DatasetSearch {
                 return;
             }
             match self.method.ask() {
-                Proposal::Evaluate(at) if admissible(&self.space.point(at)) => return,
+                Proposal::Evaluate(at) if self.space.admits(&self.space.point(at)) => return,
                 Proposal::Evaluate(_) => self.method.refuse(),
                 Proposal::Stopped(stop) => self.stopped(specification, stop),
             }
@@ -444,7 +445,7 @@ fn method_of_start(
 /// Returns the box for one of the searches for a set of data. Its start is that of the parameters, or a
 /// random point, which is the same for every set.
 fn space_of_start(specification: &JobSpecification, set: usize, start: u32) -> SearchBox {
-    let space = SearchBox::new(specification.ranges_of(set));
+    let space = SearchBox::new(specification.ranges_of(set)).with_pores(specification.setup.pores);
     let start = specification.search.first_start + u64::from(start);
     if start == 0 {
         return space;
@@ -454,7 +455,7 @@ fn space_of_start(specification: &JobSpecification, set: usize, start: u32) -> S
         let index = u64::MAX - (start * START_TRIES + attempt);
         space.started_at(Germs::draw(specification.monte_carlo.seed, index).values())
     });
-    let mut usable = tries.filter(|moved| admissible(&moved.point(&moved.start())));
+    let mut usable = tries.filter(|moved| moved.admits(&moved.point(&moved.start())));
     usable.next().unwrap_or(space)
 }
 
@@ -473,7 +474,7 @@ fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Parameter
         };
         let steps = [value + step, value - step].into_iter();
         let mut within = steps.filter(|value| (lower..=upper).contains(value)).map(moved);
-        within.find(|(_, point)| admissible(point))
+        within.find(|(_, point)| admissible(&specification.setup.pores, point))
     };
     Parameter::ALL.into_iter().rev().filter_map(beside).collect()
 }

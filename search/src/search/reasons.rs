@@ -266,7 +266,10 @@ fn holds_back(
     };
     let mut beyond = *point;
     beyond.0[parameter as usize] += step * specification.range(parameter).edge();
-    let Some((before, after)) = closed_form(point).zip(closed_form(&beyond)) else { return true };
+    let pores = &specification.setup.pores;
+    let Some((before, after)) = closed_form(pores, point).zip(closed_form(pores, &beyond)) else {
+        return true;
+    };
     let errors = agreement.errors.unwrap_or([1.0; MOMENTS]);
     let nearer = [0, 1].map(|axis| {
         let change = after[axis] - before[axis];

@@ -7,6 +7,8 @@ use osteon_common::job::{
 use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::extended;
+use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
+use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
 use osteon_common::random_quantities::{RandomDistribution, Scatter};
 use osteon_common::settings::{Method, SolverSettings};
 use proptest::prelude::*;
@@ -37,7 +39,7 @@ fn data() -> impl Strategy<Value = Data> {
             velocities.insert(0, 1999.0);
             Data::from_velocities(velocities)
         }),
-        (proptest::collection::vec("[a-zβ ]{1,9}", 1..5), any::<[bool; 3]>()).prop_map(
+        (proptest::collection::vec("[a-zβ ]{1,9}", 1..5), any::<[bool; 6]>()).prop_map(
             |(names, known)| {
                 let group = |(i, name): (usize, &String)| Group {
                     name: format!("{name}{i}"),
@@ -57,8 +59,8 @@ fn data() -> impl Strategy<Value = Data> {
 }
 
 /// Returns values for those quantities that are known, other ones for each group.
-fn known_quantities(group: usize, known: [bool; 3]) -> KnownQuantities {
-    let (usual, mut values) = ([4e-3, 20.0, 1500.0], [None; 3]);
+fn known_quantities(group: usize, known: [bool; 6]) -> KnownQuantities {
+    let (usual, mut values) = ([0.1, 0.05, 0.15, 4e-3, 20.0, 1500.0], [None; 6]);
     for ((value, usual), known) in values.iter_mut().zip(usual).zip(known) {
         *value = known.then_some(usual * (1.0 + 0.01 * group as f64));
     }
@@ -136,7 +138,37 @@ fn random() -> impl Strategy<Value = RandomQuantities> {
     })
 }
 
+fn pores() -> impl Strategy<Value = Pores> {
+    let shape = proptest::sample::select(ProfileShape::ALL.to_vec());
+    let homogenisation = proptest::sample::select(Homogenisation::ALL.to_vec());
+    let profile = (0.06..0.3, 0.06..0.3, shape, 2_u32..=16);
+    (any::<bool>(), profile, homogenisation, 0.0..1e10).prop_map(
+        |(is_profile, (surface, marrow, shape, sublayers), homogenisation, bulk_modulus)| {
+            let fluid = PoreFluid { bulk_modulus, ..PoreFluid::default() };
+            let model = PorosityModel { homogenisation, fluid };
+            let default = PorosityProfile::default();
+            let sublayers =
+                if shape == ProfileShape::Linear { sublayers } else { default.sublayers };
+            let (surface, marrow) = (Some(surface), Some(marrow));
+            match is_profile {
+                true => Pores {
+                    porosity: None,
+                    profile: PorosityProfile { surface, marrow, shape, sublayers },
+                    model,
+                },
+                false => Pores { porosity: surface, profile: default, model },
+            }
+        },
+    )
+}
+
 fn setup() -> impl Strategy<Value = Setup> {
+    let pores = proptest::option::of(pores());
+    (layered(), pores)
+        .prop_map(|(setup, pores)| Setup { pores: pores.unwrap_or_default(), ..setup })
+}
+
+fn layered() -> impl Strategy<Value = Setup> {
     let exact = (0.5..1.5, proptest::option::of(2.0..99.0)).prop_map(|(refinement, quality)| {
         let mut setup = Setup::default();
         setup.solver.refinement = refinement;
@@ -174,7 +206,7 @@ prop_compose! {
 fn searched(
     mut parameters: [Range; PARAMETERS],
     setup: &Setup,
-    chosen: [bool; 3],
+    chosen: [bool; 6],
 ) -> [Range; PARAMETERS] {
     for (parameter, _) in Parameter::ALL.into_iter().skip(7).zip(chosen).filter(|one| one.1) {
         if let Some(value) = parameter.of_setup().and_then(|quantity| quantity.value_in(setup)) {
@@ -188,7 +220,7 @@ fn searched(
 prop_compose! {
     pub(super) fn specification()(
         data in proptest::option::of(data()),
-        (parameters, chosen) in (parameters(), any::<[bool; 3]>()),
+        (parameters, chosen) in (parameters(), any::<[bool; 6]>()),
         points in 2_u64..=9765,
         scrambles in proptest::option::of(1_u64..=1024),
         control_variate: bool,
@@ -200,7 +232,7 @@ prop_compose! {
         starts in 1_u64..100,
         first_start in 0_u64..=1000,
         sensitivities: bool,
-        weights in proptest::array::uniform10(proptest::option::of(1e-9..1.0)),
+        weights in proptest::collection::vec(proptest::option::of(1e-9..1.0), PARAMETERS),
         setup in setup(),
         random in random(),
         posterior in proptest::option::of(posterior()),

@@ -117,7 +117,9 @@ fn starts() -> impl Iterator<Item = (u64, [f64; 7])> {
         });
         (index, start)
     });
-    starts.filter(|(_, start)| admissible(&all_free(start).point(&all_free(start).start())))
+    starts.filter(|(_, start)| {
+        admissible(&Pores::default(), &all_free(start).point(&all_free(start).start()))
+    })
 }
 
 /// The descent from this start alone ends at 0.8520; half a box away there is a point at 0.8437.

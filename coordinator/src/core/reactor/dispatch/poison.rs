@@ -12,6 +12,7 @@ use std::time::Duration;
 use osteon_common::case::Case;
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
+use osteon_common::realization::Realization;
 use osteon_files::case_file;
 
 use super::{batches, schedule};
@@ -123,8 +124,9 @@ pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<RunFai
 fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> String {
     let case = || {
         let ensemble = specification.ensemble(point).ok()?;
-        let bone = ensemble.bone(index).ok()?;
-        Some(Case { setup: ensemble.setup(index, &specification.setup), bone: bone.into() })
+        let Realization { own_setup, bone } =
+            ensemble.realization(index, &specification.setup).ok()?;
+        Some(Case { setup: own_setup.unwrap_or(specification.setup), bone })
     };
     case().map_or_else(String::new, |case| case_file::to_toml(&case))
 }
