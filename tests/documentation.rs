@@ -207,12 +207,13 @@ fn run_in(scratch: &Scratch, command: &str) {
 }
 
 /// The pages for users that show files and commands, with the least number of commands of each.
-const GUIDES: [(&str, usize); 11] = [
+const GUIDES: [(&str, usize); 12] = [
     ("docs/quick-start.md", 5),
     ("docs/tutorial.md", 3),
     ("docs/how-to-csv.md", 3),
     ("docs/how-to-observables.md", 2),
     ("docs/how-to-attenuation.md", 3),
+    ("docs/how-to-porosity.md", 2),
     ("docs/how-to-cluster.md", 2),
     ("docs/how-to-resume.md", 2),
     ("docs/how-to-posterior.md", 1),
@@ -246,6 +247,12 @@ fn check_guide(page: &str, scratch: &Scratch) {
     let read = |name: &str| fs::read_to_string(scratch.path(name)).unwrap();
     let json = |name: &str| serde_json::from_str::<serde_json::Value>(&read(name)).unwrap();
     match page {
+        "docs/how-to-porosity.md" => {
+            // The data are the moments of the example's velocities, whose bone has a tenth of pores.
+            let found = json("found/result.json");
+            let porosity = found["parameters"]["porosity"].as_f64().unwrap();
+            assert!((porosity - 0.0992).abs() < 1e-3, "{porosity}");
+        }
         "docs/quick-start.md" => {
             // The tutorial quotes these.
             let pairs = read("patients/comparison.csv");

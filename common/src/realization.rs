@@ -164,6 +164,7 @@ impl Ensemble {
 mod tests {
     use super::*;
     use crate::germ_source::GermScheme;
+    use crate::random_quantities::Scatter;
     use crate::statistics;
 
     const OPTIMUM: Point =
@@ -177,6 +178,31 @@ mod tests {
         assert_eq!(Ensemble::new(&OPTIMUM, 7).unwrap().bone(3).unwrap(), bone);
         assert_ne!(ensemble.bone(4).unwrap(), bone);
         assert_ne!(Ensemble::new(&OPTIMUM, 8).unwrap().bone(3).unwrap(), bone);
+    }
+
+    #[test]
+    fn a_realization_has_the_porosity_of_its_own_setup() {
+        let mut setup = Setup::default();
+        let none = Ensemble::new(&OPTIMUM, 7).unwrap();
+        let bone = none.bone(3).unwrap();
+        let plain = Realization { own_setup: None, bone: bone.into() };
+        assert_eq!(none.realization(3, &setup), Ok(plain));
+        // Nearly without pores or dispersion, it is the mean model.
+        setup.pores.porosity = Some(1e-9);
+        let CaseBone::Homogeneous(porous) = none.realization(3, &setup).unwrap().bone else {
+            panic!("one porosity");
+        };
+        let change = porous.elasticity.rows()[0][0] / bone.elasticity.rows()[0][0] - 1.0;
+        assert!(change.abs() < 1e-7 && change != 0.0, "{change}");
+        setup.pores.porosity = Some(0.1);
+        let scatter = Scatter { standard_deviation: Some(0.02), ..Scatter::default() };
+        let random = RandomQuantities { porosity: scatter, ..RandomQuantities::default() };
+        let Realization { own_setup, bone } =
+            none.with_random(random).realization(3, &setup).unwrap();
+        let own = own_setup.and_then(|setup| setup.pores.porosity).unwrap();
+        let CaseBone::Homogeneous(bone) = bone else { panic!("one porosity") };
+        let expected = (1.0 - own) * OPTIMUM.density() + own * 1000.0;
+        assert!(own != 0.1 && (bone.density - expected).abs() < 1e-9, "{own}");
     }
 
     #[test]

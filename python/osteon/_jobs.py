@@ -53,6 +53,7 @@ class Job:
         probe: source, receivers, pulse.
         picking: criterion of the first arriving signal.
         solver: settings of the wave solver.
+        bone: pores of the bone: with a porosity, `parameters` are those of the bone between the pores.
         random: scatter of quantities of the setup.
         monte_carlo: number of realizations, seed, sampling.
         objective: the function to be minimised.
@@ -77,6 +78,7 @@ class Job:
         probe: sections.Probe | Mapping[str, Any] | None = None,
         picking: sections.Picking | Mapping[str, Any] | None = None,
         solver: sections.Solver | Mapping[str, Any] | None = None,
+        bone: sections.Bone | Mapping[str, Any] | None = None,
         random: sections.Random | Mapping[str, Any] | None = None,
         monte_carlo: sections.MonteCarlo | Mapping[str, Any] | None = None,
         objective: sections.Objective | Mapping[str, Any] | None = None,
@@ -88,6 +90,7 @@ class Job:
             "probe": probe,
             "picking": picking,
             "solver": solver,
+            "bone": bone,
             "parameters": parameters,
             "random": random,
             "monte_carlo": monte_carlo,
