@@ -35,10 +35,8 @@ impl CaseSolver {
         setup: &Setup,
     ) -> Result<f64, ProtocolError> {
         let elasticity = point.constants().elasticity();
-        let elasticity = elasticity.map_err(|error| ProtocolError {
-            no_value: true,
-            ..ProtocolError::input(format!("input[0]: {error}"))
-        })?;
+        let elasticity = elasticity
+            .map_err(|error| ProtocolError::input(format!("input[0]: {error}")).without_value())?;
         let bone = Bone { density: point.density(), elasticity };
         let _core = self.cores.acquire().await;
         let solver = self.solver(&point.setup(setup));
