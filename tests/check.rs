@@ -132,8 +132,7 @@ fn a_case_file_is_sent_to_the_command_for_it() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/cases/A.toml");
     let refused = run(&["check", file]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
-    let expected =
-        "A.toml is a case file, which describes one bone, and no job; `osteon simulate` solves it";
+    let expected = "A.toml is not a job file but a case file, which describes one bone; `osteon simulate` solves it";
     assert!(refused.stderr.contains(expected), "{refused:?}");
 }
 

@@ -29,14 +29,24 @@ transverse_poisson_ratio = 0.4495
 
 /// Command lines, in a directory with job.toml, case.toml, clean.csv and book.xlsx.
 const COMMANDS: &[(&str, Words)] = &[
-    ("identify case.toml", &["case.toml is a case file", "`osteon simulate`"]),
-    ("propagate case.toml", &["case.toml is a case file", "`osteon simulate`"]),
-    ("check case.toml", &["case.toml is a case file", "`osteon simulate`"]),
-    ("draw case.toml --index 1", &["case.toml is a case file"]),
-    ("umbridge case.toml --port 0", &["case.toml is a case file"]),
-    ("simulate job.toml", &["job.toml is a job file", "`osteon identify`", "`osteon draw`"]),
-    ("identify clean.csv", &["clean.csv is data", "`osteon init clean.csv`"]),
-    ("simulate clean.csv", &["clean.csv is data"]),
+    ("identify case.toml", &["case.toml is not a job file but a case file", "`osteon simulate`"]),
+    ("propagate case.toml", &["case.toml is not a job file but a case file", "`osteon simulate`"]),
+    ("check case.toml", &["case.toml is not a job file but a case file", "`osteon simulate`"]),
+    ("draw case.toml --index 1", &["case.toml is not a job file but a case file"]),
+    ("umbridge case.toml --port 0", &["case.toml is not a job file but a case file"]),
+    (
+        "simulate job.toml",
+        &[
+            "job.toml is not a case file, which describes one bone, but a job file",
+            "`osteon identify`",
+            "`osteon draw`",
+        ],
+    ),
+    (
+        "identify clean.csv",
+        &["clean.csv is not a job or case file but data", "`osteon init clean.csv`"],
+    ),
+    ("simulate clean.csv", &["clean.csv is not a job or case file but data"]),
     ("identify book.xlsx", &["book.xlsx is a spreadsheet", "save the velocities as CSV"]),
     ("identify job", &["must end in .toml or .json"]),
     ("identify absent.toml", &["cannot read absent.toml", "No such file"]),

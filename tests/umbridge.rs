@@ -390,7 +390,7 @@ fn a_server_that_cannot_start_says_why() {
     for (arguments, code, expected) in [
         (vec!["umbridge", text(&file), "--port", &port], 1, "choose another --port"),
         (vec!["umbridge", "none.toml"], 2, "none.toml"),
-        (vec!["umbridge", &case], 2, "is a case file"),
+        (vec!["umbridge", &case], 2, "is not a job file but a case file"),
         (vec!["umbridge", text(&file), "--token-file", "x"], 2, "--coordinator URL"),
     ] {
         let ended = run(&arguments);

@@ -3,17 +3,17 @@
 use osteon_common::limits::NAME_BYTES_MAX;
 use osteon_proto::identity::{self, NoRandomness};
 
-/// Identifies a submission. A coordinator keeps the ids of different clients apart.
+/// Id of a submission. A coordinator keeps the ids of different clients apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RequestId {
-    /// Id chosen by the submitter; never empty.
+    /// The id itself; never empty.
     pub id: String,
     /// Name of the submitting client.
     pub client: String,
 }
 
 impl RequestId {
-    /// Creates a request with a new random id.
+    /// Creates a new random id.
     ///
     /// # Errors
     /// If the operating system provides no random numbers.
@@ -21,7 +21,7 @@ impl RequestId {
         identity::random_digits::<16>().map(Self::with_id)
     }
 
-    /// Creates a request with an id chosen by the user.
+    /// Takes an id that the user has chosen, which is not empty.
     pub fn with_id(id: String) -> Self {
         Self { id, client: user() }
     }
@@ -32,8 +32,6 @@ fn user() -> String {
     let user = ["USER", "LOGNAME"].iter().find_map(|name| std::env::var(name).ok());
     let host = identity::host_name().unwrap_or_default();
     let mut name = format!("{}@{host}", user.unwrap_or_default());
-    while name.len() > NAME_BYTES_MAX {
-        name.pop();
-    }
+    name.truncate(name.floor_char_boundary(NAME_BYTES_MAX));
     name
 }

@@ -1,4 +1,4 @@
-//! A job from its submission to its results, on a coordinator or in this process.
+//! A job from its submission to its results, on a running coordinator or on one in this process.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -31,8 +31,8 @@ pub struct JobRun<'a> {
     pub program: &'a Program,
 }
 
-/// Runs a job on workers in this process, whose coordinator ends with it. `show` is passed every snapshot.
-/// If `stop` completes first, the run ends with its value.
+/// Runs a job on a coordinator in this process and on worker processes beside it, all of which end with the
+/// run. `show` is passed every snapshot. If `stop` completes first, the run ends with its value.
 ///
 /// # Errors
 /// If coordinator, workers or the job cannot continue; the error of `show`; `stop`.

@@ -1,16 +1,17 @@
-//! Complete results for tests, in which a test sets only the keys that matter to it.
+//! Complete results for tests, in which a test sets only the keys that matter to it. The tests of the
+//! program `osteon` compile this file too.
 
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary};
 use osteon_files::report::{PosteriorReport, ResultFile};
 use serde_json::Value;
 
-/// Returns a complete result of an identification, in which the keys of `partial` are replaced.
+/// Returns a complete result of an identification, with the keys of `partial`, a text in JSON, set in it.
 pub(crate) fn identification(partial: &str) -> ResultFile {
     filled(include_str!("../../fuzz/corpus/results/identification.json"), partial)
 }
 
-/// Returns a complete result of a propagation, in which the keys of `partial` are replaced.
+/// Returns a complete result of a propagation, with the keys of `partial`, a text in JSON, set in it.
 pub(crate) fn propagation(partial: &str) -> ResultFile {
     filled(include_str!("../../fuzz/corpus/results/propagation.json"), partial)
 }

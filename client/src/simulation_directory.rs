@@ -21,7 +21,9 @@ use crate::run_error::RunError;
 /// The file of the traces.
 pub const TRACES: &str = "traces.csv";
 /// Start of the first line of `case.toml`; the options of the traces follow.
-const COMMAND: &str = "# osteon simulate case.toml";
+const COMMAND: &str = "# osteon simulate case.toml --out again";
+/// The same without the directory, as earlier versions wrote it.
+const COMMAND_BEFORE: &str = "# osteon simulate case.toml";
 
 /// The case and options to which a simulation's directory belongs.
 pub struct SimulationKey<'a> {
@@ -35,7 +37,7 @@ pub struct SimulationKey<'a> {
 
 impl SimulationKey<'_> {
     /// Returns the text of `case.toml`: the case with all defaults, below the command that creates
-    /// the same files from it.
+    /// the same files from it in another directory.
     fn text(&self) -> String {
         let Self { case, duration, time_step } = self;
         let command = format!("{COMMAND} --duration {duration:?} --time-step {time_step:?}\n");
@@ -115,7 +117,8 @@ impl SimulationKey<'_> {
 /// Returns duration and time step, s, of the traces that belong to a `case.toml` with the text
 /// `stored`.
 fn traces_of(stored: &str) -> Option<[f64; 2]> {
-    let options = stored.lines().next()?.strip_prefix(COMMAND)?;
+    let line = stored.lines().next()?;
+    let options = line.strip_prefix(COMMAND).or_else(|| line.strip_prefix(COMMAND_BEFORE))?;
     let (duration, time_step) =
         options.strip_prefix(" --duration ")?.split_once(" --time-step ")?;
     Some([duration.parse().ok()?, time_step.parse().ok()?])
@@ -131,8 +134,13 @@ mod tests {
     fn the_same_simulation_is_known_in_other_words() {
         let case = case_file::parse(CASE_TEXT, Format::Toml).unwrap();
         let mine = SimulationKey { case: &case, duration: 3e-5, time_step: 1e-8 };
-        let shorter = format!("{COMMAND} --duration 3e-5 --time-step 0.00000001\n{CASE_TEXT}");
-        for stored in [mine.text(), shorter] {
+        assert!(mine.text().starts_with(
+            "# osteon simulate case.toml --out again --duration 3e-5 --time-step 1e-8\n"
+        ));
+        let shorter = |command: &str| {
+            format!("{command} --duration 3e-5 --time-step 0.00000001\n{CASE_TEXT}")
+        };
+        for stored in [mine.text(), shorter(COMMAND), shorter(COMMAND_BEFORE)] {
             assert_eq!(mine.difference_from(&stored), None, "{stored}");
         }
     }

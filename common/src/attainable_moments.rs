@@ -55,7 +55,8 @@ impl AttainableMoments {
     ) -> Self {
         let dispersion = ends(ranges, Parameter::Dispersion);
         let variation = |dispersion: f64, factor: f64| factor * dispersion / 14.0_f64.sqrt();
-        // Parameters of the setup change the velocities by less than the checks allow.
+        // Quantities of the setup that are searched are held at their starts: within their bounds they
+        // change the mean by less than MEAN_EXCESS_MAX.
         let setup = Point(ranges.map(|range| range.start())).setup(setup);
         let scatter = scatter_of_velocity(ranges, &setup, random);
         Self {
@@ -89,7 +90,8 @@ fn velocities(ranges: &[Range; PARAMETERS], setup: &Setup) -> (f64, f64) {
 
 /// Returns the approximate coefficient of variation that random quantities of the setup give the
 /// velocity, from the velocities one standard deviation below and above their means. The bone's
-/// thickness is not part of [`velocities`], and changes them by less than the checks allow.
+/// thickness does not occur in [`velocities`]: what it adds to the variation is less than
+/// [`VARIATION_EXCESS_MAX`] lets pass.
 fn scatter_of_velocity(
     ranges: &[Range; PARAMETERS],
     setup: &Setup,
@@ -154,21 +156,20 @@ pub(crate) fn unattainable_data(
     );
     let mut first = None;
     for set in 0..data.sets() {
-        let count = data.count(set);
-        // If other groups can be matched, one that cannot be is not an error.
-        let found = attainable.unattainable_moment(data.moments(set), count)?;
-        first.get_or_insert(found);
+        let found = attainable.unattainable_moment(data.moments(set), data.count(set));
+        // One set within reach is enough: the data are no error then.
+        first.get_or_insert(found?);
     }
-    let (moment, value, reached) = first?;
+    let Unattainable { moment, value, advice } = first?;
     Some(match &data.measurements {
-        Measurements::Moments { .. } => (moment.field(), format!("is {value:?}; {reached}")),
+        Measurements::Moments { .. } => (moment.field(), format!("is {value:?}; {advice}")),
         Measurements::Velocities { .. } => {
-            ("data.velocities", format!("their {} is {}; {reached}", moment.name(), short(value)))
+            ("data.velocities", format!("their {} is {}; {advice}", moment.name(), short(value)))
         }
         Measurements::Groups(groups) => (
             "data.groups",
             format!(
-                "none of the {} groups can be matched; the {} of the first is {}; {reached}",
+                "none of the {} groups can be matched; the {} of the first is {}; {advice}",
                 groups.len(),
                 moment.name(),
                 short(value)
@@ -200,32 +201,36 @@ impl MomentKind {
     }
 }
 
+/// A moment of the data that is far outside the attainable range.
+struct Unattainable {
+    moment: MomentKind,
+    value: f64,
+    /// What the bounds allow, and what to do.
+    advice: String,
+}
+
 impl AttainableMoments {
-    /// Returns the first moment of `data` that is far outside the attainable range: its kind, its
-    /// value, and the message. `count` is the number of velocities, if known.
-    fn unattainable_moment(
-        &self,
-        data: Moments,
-        count: Option<u64>,
-    ) -> Option<(MomentKind, f64, String)> {
+    /// Returns the first moment of `data` that is far outside the attainable range. `count` is the
+    /// number of velocities, if known.
+    fn unattainable_moment(&self, data: Moments, count: Option<u64>) -> Option<Unattainable> {
         let (mean, variation) = (data.mean, data.coefficient_of_variation);
         let (lowest, highest) = self.velocity;
         if mean < lowest / MEAN_EXCESS_MAX || mean > highest * MEAN_EXCESS_MAX {
-            let reached = format!(
+            let advice = format!(
                 "the bounds of [parameters] allow mean velocities of about {}: check the units of \
                  data and parameters, or widen the bounds",
                 span(self.velocity, " m/s")
             );
-            return Some((MomentKind::Mean, mean, reached));
+            return Some(Unattainable { moment: MomentKind::Mean, value: mean, advice });
         }
         let enough = count.is_none_or(|count| count >= VELOCITIES_MIN);
         if enough && variation > self.variation.1 * VARIATION_EXCESS_MAX {
-            let reached = format!(
+            let advice = format!(
                 "the bounds of parameters.dispersion allow coefficients of variation of about {}: check \
                  the data, or widen the bounds",
                 span(self.variation, "")
             );
-            return Some((MomentKind::Variation, variation, reached));
+            return Some(Unattainable { moment: MomentKind::Variation, value: variation, advice });
         }
         None
     }
@@ -244,8 +249,9 @@ fn span((from, to): (f64, f64), unit: &str) -> String {
     }
 }
 
-/// Returns the velocity, m/s, that a tilted probe shows of a wave along the bone: the way through the
-/// coupling grows or shrinks along the receivers, and both directions together do not see it.
+/// Returns the velocity, m/s, that a probe shows for a wave that travels along the bone at `velocity`.
+/// On a tilted probe the path through the coupling changes from receiver to receiver; with two sources
+/// this contribution cancels, and only cos(tilt) remains.
 fn apparent(setup: &Setup, velocity: f64) -> f64 {
     let probe = &setup.probe;
     if probe.tilt == 0.0 {
@@ -373,7 +379,7 @@ mod tests {
         let reported = |mean: f64, coefficient_of_variation: f64, count| {
             let data = Moments { mean, coefficient_of_variation };
             let found = attainable.unattainable_moment(data, count);
-            found.map(|(moment, _, text)| (moment, text.split(':').next().unwrap().to_owned()))
+            found.map(|it| (it.moment, it.advice.split(':').next().unwrap().to_owned()))
         };
         let velocities =
             "the bounds of [parameters] allow mean velocities of about 2700 to 4700 m/s";

@@ -294,7 +294,7 @@ impl Fleet {
                     let (took, outcomes) = gathered.unwrap();
                     self.completed.push_back(Event::Gathered(outcomes));
                     self.schedule(took, Next::Completed);
-                    self.completed.push_back(Event::Completed(completed.unwrap()));
+                    self.completed.push_back(Event::Completed(completed));
                     self.schedule(begun.elapsed(), Next::Completed);
                 }
                 Effect::Store(record) => {

@@ -7,6 +7,7 @@ pub(crate) mod attachments;
 pub mod audit;
 pub mod ballot;
 pub(crate) mod batch;
+pub(crate) mod bounded_duration;
 pub mod close_reason;
 pub mod completion;
 pub(crate) mod concerns;

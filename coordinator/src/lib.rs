@@ -23,7 +23,7 @@ pub use access::tokens::Tokens;
 pub use config::Config;
 #[cfg(feature = "live")]
 pub use live::listener::PageBindError;
-pub use service::failing::ComponentFailure;
+pub use service::failure_reporter::ComponentFailure;
 pub use service::listen::{BindError, ListenAddress, Listener};
 pub use service::metrics_listener::{MetricsBindError, MetricsListener};
 pub use service::shell::{Coordinator, StartError, start};

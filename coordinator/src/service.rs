@@ -6,7 +6,7 @@ pub(crate) mod backing_up;
 pub(crate) mod beside;
 pub(crate) mod control_frames;
 pub(crate) mod core_task;
-pub(crate) mod failing;
+pub(crate) mod failure_reporter;
 pub(crate) mod fetching;
 pub(crate) mod job_spans;
 pub(crate) mod jobs;

@@ -272,15 +272,15 @@ pub trait Store {
     /// When it is not durable.
     fn put_job(&mut self, record: &JobRecord) -> Result<(), StoreError>;
 
-    /// Makes an evaluation durable, replacing the one with the same number; with `is_last`, deletes
-    /// all evaluations after it in the same transaction.
+    /// Makes an evaluation durable, replacing the one with the same number. With `deletes_later`, all
+    /// evaluations after it are deleted in the same transaction: they belong to another path of the search.
     ///
     /// # Errors
     /// When that is not durable.
     fn put_evaluation(
         &mut self,
         record: &EvaluationRecord,
-        is_last: bool,
+        deletes_later: bool,
     ) -> Result<(), StoreError>;
 
     /// Keeps results of an evaluation until the evaluation at the same point is stored, or its job ends

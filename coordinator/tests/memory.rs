@@ -38,7 +38,7 @@ fn run(state: &mut State, store: &mut SqliteStore, request: Request) {
             Effect::Complete(completion) => {
                 let mut events = Vec::new();
                 let completed = completion.run(|outcomes| events.push(Event::Gathered(outcomes)));
-                events.extend(completed.map(Event::Completed));
+                events.push(Event::Completed(completed));
                 events
             }
             Effect::Store(record) => vec![fake::written(store, &record)],

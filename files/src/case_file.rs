@@ -11,7 +11,7 @@ use osteon_common::limits;
 
 use crate::document::{Format, Node};
 use crate::document_text::DocumentText;
-use crate::file_error::{Bound, ContentError, FileError, Invalid};
+use crate::file_error::{ContentError, FileError, Invalid, SizeLimit};
 use crate::input_file::InputFile;
 use crate::job_file;
 use crate::reader::Reader;
@@ -20,7 +20,8 @@ use crate::setting::Setting;
 pub use crate::toml_text::case as to_toml;
 
 /// Limit of a case file's length; one with a matrix and all keys has a few kilobytes.
-const BOUND: Bound = Bound { bytes: limits::CASE_FILE_BYTES_MAX, purpose: "any case file needs" };
+const SIZE_LIMIT: SizeLimit =
+    SizeLimit { bytes: limits::CASE_FILE_BYTES_MAX, suffices_for: "any case file needs" };
 
 /// Reads the case file at `path`, or standard input if that is `-`, with `settings` that replace values
 /// of it; its extension determines the format.
@@ -28,7 +29,7 @@ const BOUND: Bound = Bound { bytes: limits::CASE_FILE_BYTES_MAX, purpose: "any c
 /// # Errors
 /// If the file cannot be read.
 pub fn open(path: &Path, settings: Vec<Setting>) -> Result<InputFile, FileError> {
-    InputFile::open(path, BOUND, settings)
+    InputFile::open(path, SIZE_LIMIT, settings)
 }
 
 /// Reads and validates the case file at `path`; its extension determines the format.

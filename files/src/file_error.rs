@@ -1,4 +1,4 @@
-//! Reading a file within limits, and the errors that can occur.
+//! Reads a file up to a maximum size; the errors of job and case files.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -33,8 +33,8 @@ pub enum FileError {
     },
     /// A case file was given where a job file is needed.
     #[error(
-        "{} is a case file, which describes one bone, and no job; `osteon simulate` solves it, and \
-         `osteon init` writes a job file",
+        "{} is not a job file but a case file, which describes one bone; `osteon simulate` solves it, \
+         and `osteon init` writes a job file",
         visible::path(path)
     )]
     CaseForJob {
@@ -43,7 +43,7 @@ pub enum FileError {
     },
     /// A job file was given where a case file is needed.
     #[error(
-        "{} is a job file, and no case file, which describes one bone; `osteon identify` and `osteon \
+        "{} is not a case file, which describes one bone, but a job file; `osteon identify` and `osteon \
          propagate` run it, and `osteon draw` writes the case file of one of its realizations",
         visible::path(path)
     )]
@@ -52,14 +52,14 @@ pub enum FileError {
         path: PathBuf,
     },
     /// The file is longer than any file of its kind needs to be.
-    #[error("{} is longer than {max_bytes} bytes, more than {purpose}", visible::path(path))]
+    #[error("{} is longer than {max_bytes} bytes, more than {suffices_for}", visible::path(path))]
     TooLarge {
         /// The file.
         path: PathBuf,
         /// Maximum number of bytes.
         max_bytes: u64,
-        /// The kind of content for which this is sufficient.
-        purpose: &'static str,
+        /// What this suffices for.
+        suffices_for: &'static str,
     },
     /// The text is refused.
     #[error("{}", content.located(path))]
@@ -72,13 +72,13 @@ pub enum FileError {
 }
 
 /// Extensions of files that contain data rather than a job.
-const OF_DATA: [&str; 6] = ["csv", "tsv", "txt", "dat", "xls", "xlsx"];
+const DATA_EXTENSIONS: [&str; 6] = ["csv", "tsv", "txt", "dat", "xls", "xlsx"];
 
 fn unknown_format(path: &Path) -> String {
     let shown = visible::path(path);
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     let extension = extension.to_ascii_lowercase();
-    if !OF_DATA.contains(&extension.as_str()) {
+    if !DATA_EXTENSIONS.contains(&extension.as_str()) {
         return format!("{shown}: the name of a job or case file must end in .toml or .json");
     }
     if extension.starts_with("xls") {
@@ -88,7 +88,7 @@ fn unknown_format(path: &Path) -> String {
         );
     }
     format!(
-        "{shown} is data, and no job or case file; `osteon init {shown}` writes a job file for it"
+        "{shown} is not a job or case file but data; `osteon init {shown}` writes a job file for it"
     )
 }
 
@@ -116,7 +116,8 @@ impl ContentError {
     }
 }
 
-/// Violations of a file that are shown with their lines; those after them have a place alone.
+/// Maximum number of violations that are shown with the text of their lines; of those after them only the
+/// place is shown.
 const EXCERPTS_MAX: usize = 10;
 
 /// Returns `PATH:LINE:COLUMN: message`.
@@ -129,9 +130,9 @@ fn at(path: &str, excerpt: &Excerpt, message: &str) -> String {
 enum ErrorPlace {
     /// In this line of a file.
     Line(Excerpt),
-    /// In a setting of the command line, which is quoted.
+    /// In this setting of the command line.
     Setting(String),
-    /// Somewhere.
+    /// In no line that is known.
     Unknown,
 }
 
@@ -140,6 +141,15 @@ impl ErrorPlace {
         match self {
             Self::Line(excerpt) => Some(excerpt.line),
             Self::Setting(_) | Self::Unknown => None,
+        }
+    }
+
+    /// Returns `message` after its place, which `in_line` writes where it is a line.
+    fn entry(&self, message: &str, in_line: impl FnOnce(&Excerpt) -> String) -> String {
+        match self {
+            Self::Line(excerpt) => in_line(excerpt),
+            Self::Setting(option) => format!("{}: {message}", visible::line(option)),
+            Self::Unknown => message.to_owned(),
         }
     }
 }
@@ -170,8 +180,11 @@ impl Invalid {
             if let Some(setting) = document.setting_of(field) {
                 return ErrorPlace::Setting(setting.to_string());
             }
-            // Only the tree knows which tables have no line of their own.
-            let span = root.line_of(field).and_then(|_| spans.span(field, unknown.contains(field)));
+            // Only the tree knows which tables have no header line of their own.
+            if root.line_of(field).is_none() {
+                return ErrorPlace::Unknown;
+            }
+            let span = spans.span(field, unknown.contains(field));
             span.map_or(ErrorPlace::Unknown, |span| ErrorPlace::Line(document.excerpt(span)))
         };
         let locate = |violation: &Violation| (place(&violation.field), violation.clone());
@@ -182,7 +195,7 @@ impl Invalid {
         Self { found }
     }
 
-    /// Returns how many violations there are.
+    /// Returns how many violations there are, in words.
     fn count(&self) -> String {
         let listed = self.found.iter().filter(|(_, violation)| !violation.more).count();
         let errors = if listed == 1 { "error" } else { "errors" };
@@ -192,24 +205,19 @@ impl Invalid {
         format!("{listed} {errors}")
     }
 
-    /// Returns the list for a file with this path.
+    /// Returns the list for the file at `path`, with the text of the first lines.
     fn located(&self, path: &str) -> String {
         let mut text = self.count();
         for (number, (place, violation)) in self.found.iter().enumerate() {
-            let violation = violation.to_string();
-            text.push_str(&match place {
-                ErrorPlace::Line(excerpt) if number >= EXCERPTS_MAX => {
-                    format!("\n  {}", at(path, excerpt, &violation))
+            let message = violation.to_string();
+            let entry = place.entry(&message, |excerpt| {
+                let located = at(path, excerpt, &message);
+                if number >= EXCERPTS_MAX {
+                    return located;
                 }
-                ErrorPlace::Line(excerpt) => {
-                    let message = at(path, excerpt, &violation);
-                    format!("\n  {message}\n  {}", excerpt.to_string().replace('\n', "\n  "))
-                }
-                ErrorPlace::Setting(option) => {
-                    format!("\n  {}: {violation}", visible::line(option))
-                }
-                ErrorPlace::Unknown => format!("\n  {violation}"),
+                format!("{located}\n  {}", excerpt.to_string().replace('\n', "\n  "))
             });
+            text.push_str(&format!("\n  {entry}"));
         }
         text
     }
@@ -219,53 +227,55 @@ impl fmt::Display for Invalid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.count())?;
         for (place, violation) in &self.found {
-            match place {
-                ErrorPlace::Line(excerpt) => write!(f, "\n  line {}: {violation}", excerpt.line)?,
-                ErrorPlace::Setting(option) => {
-                    write!(f, "\n  {}: {violation}", visible::line(option))?
-                }
-                ErrorPlace::Unknown => write!(f, "\n  {violation}")?,
-            }
+            let message = violation.to_string();
+            let in_line = |excerpt: &Excerpt| format!("line {}: {message}", excerpt.line);
+            write!(f, "\n  {}", place.entry(&message, in_line))?;
         }
         Ok(())
     }
 }
 
-/// Maximum length of a kind of file.
+/// Maximum size of a kind of file.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Bound {
+pub(crate) struct SizeLimit {
     /// Maximum number of bytes.
     pub(crate) bytes: u64,
-    /// The kind of content for which this is sufficient, as it follows "more than" in a message.
-    pub(crate) purpose: &'static str,
+    /// What this suffices for, and perhaps what else can be done: it follows "more than" in the message.
+    pub(crate) suffices_for: &'static str,
+}
+
+impl SizeLimit {
+    /// Returns the error of a larger file at `path`.
+    pub(crate) fn exceeded(self, path: PathBuf) -> FileError {
+        let Self { bytes: max_bytes, suffices_for } = self;
+        FileError::TooLarge { path, max_bytes, suffices_for }
+    }
 }
 
 /// Returns the text of the file at `path` and its format.
-pub(crate) fn read(path: &Path, bound: Bound) -> Result<(String, Format), FileError> {
+pub(crate) fn read(path: &Path, limit: SizeLimit) -> Result<(String, Format), FileError> {
     let Some(format) = Format::from_extension(path) else {
         return Err(FileError::UnknownFormat { path: path.to_owned() });
     };
-    match user_file::read(path, bound.bytes) {
-        Ok(Some(bytes)) => utf8(bytes, format, path).map(|text| (text, format)),
-        Ok(None) => {
-            let Bound { bytes: max_bytes, purpose } = bound;
-            Err(FileError::TooLarge { path: path.to_owned(), max_bytes, purpose })
-        }
+    match user_file::read(path, limit.bytes) {
+        Ok(Some(bytes)) => text_of(bytes, format, path).map(|text| (text, format)),
+        Ok(None) => Err(limit.exceeded(path.to_owned())),
         Err(error) => Err(FileError::Unreadable { path: path.to_owned(), error }),
     }
 }
 
-/// Returns the text of the file at `path`.
-pub(crate) fn utf8(bytes: Vec<u8>, format: Format, path: &Path) -> Result<String, FileError> {
+/// Returns the text that `bytes`, read from `path`, are in UTF-8.
+pub(crate) fn text_of(bytes: Vec<u8>, format: Format, path: &Path) -> Result<String, FileError> {
     String::from_utf8(bytes).map_err(|error| {
         let content = ContentError::Malformed(not_utf8(&error, format));
         FileError::Content { path: path.to_owned(), content }
     })
 }
 
+/// Returns the error at the first byte that is not UTF-8.
 fn not_utf8(error: &std::string::FromUtf8Error, format: Format) -> SyntaxError {
     let valid = error.utf8_error().valid_up_to();
-    // What is valid keeps its length.
+    // The valid part before it keeps its length, so that the place stays the same.
     let text = String::from_utf8_lossy(error.as_bytes());
     let byte = error.as_bytes().get(valid).copied().unwrap_or_default();
     SyntaxError {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::document::Format;
 use crate::document_text::DocumentText;
-use crate::file_error::{self, Bound, FileError};
+use crate::file_error::{self, FileError, SizeLimit};
 use crate::setting::Setting;
 
 /// The name that denotes standard input.
@@ -27,15 +27,15 @@ impl InputFile {
     /// Reads the file at `path`, or standard input if that is `-`.
     pub(crate) fn open(
         path: &Path,
-        bound: Bound,
+        limit: SizeLimit,
         settings: Vec<Setting>,
     ) -> Result<Self, FileError> {
         if path == Path::new(STANDARD_INPUT) {
-            let (text, format) = standard_input(bound)?;
+            let (text, format) = standard_input(limit)?;
             let path = PathBuf::from(STANDARD_INPUT_SHOWN);
             return Ok(Self { path, directory: PathBuf::new(), format, text, settings });
         }
-        let (text, format) = file_error::read(path, bound)?;
+        let (text, format) = file_error::read(path, limit)?;
         let directory = path.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self { path: path.to_owned(), directory, format, text, settings })
     }
@@ -59,16 +59,15 @@ impl InputFile {
 /// Reads standard input to its end: JSON if it begins with a brace, which no TOML does.
 ///
 /// How long it takes is up to whoever writes it; a signal ends the program meanwhile.
-fn standard_input(bound: Bound) -> Result<(String, Format), FileError> {
+fn standard_input(limit: SizeLimit) -> Result<(String, Format), FileError> {
     let path = || PathBuf::from(STANDARD_INPUT_SHOWN);
     let mut bytes = Vec::new();
-    let read = io::stdin().lock().take(bound.bytes + 1).read_to_end(&mut bytes);
+    let read = io::stdin().lock().take(limit.bytes + 1).read_to_end(&mut bytes);
     read.map_err(|error| FileError::Unreadable { path: path(), error })?;
-    if bytes.len() as u64 > bound.bytes {
-        let Bound { bytes: max_bytes, purpose } = bound;
-        return Err(FileError::TooLarge { path: path(), max_bytes, purpose });
+    if bytes.len() as u64 > limit.bytes {
+        return Err(limit.exceeded(path()));
     }
     let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
     let format = if first == Some(&b'{') { Format::Json } else { Format::Toml };
-    file_error::utf8(bytes, format, &path()).map(|text| (text, format))
+    file_error::text_of(bytes, format, &path()).map(|text| (text, format))
 }

@@ -24,7 +24,7 @@ use osteon_common::warnings::{self, Warning};
 
 use crate::document::{Format, Node};
 use crate::document_text::DocumentText;
-use crate::file_error::{Bound, ContentError, FileError, Invalid};
+use crate::file_error::{ContentError, FileError, Invalid, SizeLimit};
 use crate::input_file::InputFile;
 use crate::pores;
 use crate::reader::{self, Reader, Table};
@@ -36,9 +36,9 @@ pub use self::schema::schema;
 pub use crate::toml_text::job as to_toml;
 
 /// Limit of a job file's length; it may contain measured velocities.
-const BOUND: Bound = Bound {
+const SIZE_LIMIT: SizeLimit = SizeLimit {
     bytes: limits::JOB_FILE_BYTES_MAX,
-    purpose: "a job with a million velocities needs; data.velocities may also name a CSV file",
+    suffices_for: "a job with a million velocities needs; data.velocities may also name a CSV file",
 };
 
 /// Reads and validates the job file at `path`; its extension determines the format. If it names a
@@ -71,7 +71,7 @@ pub struct JobWithWarnings {
 /// # Errors
 /// If the file cannot be read.
 pub fn open(path: &Path, settings: Vec<Setting>) -> Result<InputFile, FileError> {
-    InputFile::open(path, BOUND, settings)
+    InputFile::open(path, SIZE_LIMIT, settings)
 }
 
 /// Reads a job file as [`read`] does, and also returns warnings and notes.

@@ -173,7 +173,7 @@ fn files_that_cannot_be_read() {
     check(
         "a.txt",
         None,
-        "DIR/a.txt is data, and no job or case file; `osteon init DIR/a.txt` writes a job file for it",
+        "DIR/a.txt is not a job or case file but data; `osteon init DIR/a.txt` writes a job file for it",
     );
     check(
         "b.toml",

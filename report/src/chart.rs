@@ -54,11 +54,8 @@ impl Chart {
     pub(crate) fn csv(&self) -> String {
         let mut out = "series,label,x,x_end,y,y_end\n".to_owned();
         for layer in &self.layers {
-            let unnamed = match layer.shape {
-                Shape::Texts(_) | Shape::Rectangles(_) => "",
-                _ => "line",
-            };
-            let series = if layer.name.is_empty() { unnamed } else { &layer.name };
+            let series =
+                if layer.name.is_empty() { layer.shape.series_name() } else { &layer.name };
             for ([x, x_end, y, y_end], label) in layer.shape.numbers() {
                 let label = if label.is_empty() { self.category(y, x) } else { label };
                 let [x, x_end, y, y_end] = [x, x_end, y, y_end].map(cell);
@@ -70,7 +67,7 @@ impl Chart {
         out
     }
 
-    /// Name of the category at a place, empty if no axis has categories.
+    /// Returns the name of the category at a place, empty if no axis has categories.
     fn category(&self, y: f64, x: f64) -> &str {
         let index = |axis: &Axis, value: f64| -> Option<usize> {
             let place = value.round();
@@ -178,6 +175,19 @@ pub(crate) enum Shape {
 }
 
 impl Shape {
+    /// Returns the name in the table of a layer without one of its own; empty for those whose elements
+    /// have labels.
+    fn series_name(&self) -> &'static str {
+        match self {
+            Self::Line(_) | Self::Level(_) | Self::Upright(_) => "line",
+            Self::Points(_) | Self::Dots(_) => "points",
+            Self::Band(_) => "band",
+            Self::Bars(_) => "bars",
+            Self::Intervals(_) => "intervals",
+            Self::Rectangles(_) | Self::Texts(_) => "",
+        }
+    }
+
     /// Returns x, end of x, y and end of y of each element, NaN where there is none, and its text.
     fn numbers(&self) -> Vec<([f64; 4], &str)> {
         const NONE: f64 = f64::NAN;
@@ -190,11 +200,8 @@ impl Shape {
             Self::Band(band) => {
                 without_text(band.iter().map(|&[x, a, b]| [x, NONE, a, b]).collect())
             }
-            Self::Bars(bars) => {
-                without_text(bars.iter().map(|&[a, b, y]| [a, b, y, NONE]).collect())
-            }
-            Self::Intervals(intervals) => {
-                without_text(intervals.iter().map(|&[a, b, y]| [a, b, y, NONE]).collect())
+            Self::Bars(extents) | Self::Intervals(extents) => {
+                without_text(extents.iter().map(|&[a, b, y]| [a, b, y, NONE]).collect())
             }
             Self::Level(y) => without_text(vec![[NONE, NONE, *y, NONE]]),
             Self::Upright(x) => without_text(vec![[*x, NONE, NONE, NONE]]),
@@ -240,10 +247,11 @@ mod tests {
         chart.layer("=model", Ink::First, Shape::Line(vec![[1.0, 2.5], [2.0, f64::NAN]]));
         chart.layer("band", Ink::First, Shape::Band(vec![[1.0, 2.0, 3.0]]));
         chart.layer("", Ink::Muted, Shape::Level(0.1));
+        chart.layer("", Ink::Muted, Shape::Dots(vec![[3.0, 4.0]]));
         assert_eq!(
             chart.csv(),
             "series,label,x,x_end,y,y_end\n\"'=model\",,1.0,,2.5,\n\"'=model\",,2.0,,,\n\
-             band,,1.0,,2.0,3.0\nline,,,,0.1,\n"
+             band,,1.0,,2.0,3.0\nline,,,,0.1,\npoints,,3.0,,4.0,\n"
         );
     }
 

@@ -2,8 +2,6 @@
 //! osteon-solver --bench realization`.
 
 #![expect(clippy::expect_used, reason = "the bones are known to have a velocity")]
-#![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
-#![expect(dead_code, reason = "each benchmark uses a part of it")]
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -14,14 +12,17 @@ use osteon_common::settings::Method;
 use osteon_solver::stages::{StageWorkspace, Stages};
 use osteon_solver::{Isa, Solver, Workspace};
 
-mod measure;
+mod measure {
+    pub(crate) mod draws;
+}
 
 use measure::draws::{bones, ensemble, setup};
 
 /// Bones that are computed in turn, so that a mean includes second passes in their share.
 const BONES: u64 = 200;
 
-fn one_after_another(criterion: &mut Criterion, method: Method, isa: Isa, bones: &[Bone]) {
+/// Times the realizations of `bones` in turn.
+fn time_in_turn(criterion: &mut Criterion, method: Method, isa: Isa, bones: &[Bone]) {
     let solver = Solver::with_isa(&setup(method, 1.0), isa);
     let mut workspace = Workspace::default();
     let mut bones = bones.iter().cycle();
@@ -40,9 +41,10 @@ fn one_after_another(criterion: &mut Criterion, method: Method, isa: Isa, bones:
 fn methods(criterion: &mut Criterion) {
     let bones = bones(0, BONES);
     for isa in Isa::available() {
-        one_after_another(criterion, Method::Exact, isa, &bones);
+        time_in_turn(criterion, Method::Exact, isa, &bones);
     }
-    one_after_another(criterion, Method::Hybrid, Isa::fastest(), &bones[..1]);
+    // A realization takes a quarter of a second: the few samples are of the same bone, so that they compare.
+    time_in_turn(criterion, Method::Hybrid, Isa::fastest(), &bones[..1]);
 }
 
 fn stages(criterion: &mut Criterion) {
@@ -55,22 +57,22 @@ fn stages(criterion: &mut Criterion) {
     group.bench_function("tensor", |bencher| {
         bencher.iter(|| stages.tensor(black_box(&bone), &mut memory).is_ok());
     });
-    let mut filled = stages.tensor(&bone, &mut memory).expect("a plate");
+    let mut plate = stages.tensor(&bone, &mut memory).expect("a plate");
     group.bench_function("admittance", |bencher| {
         bencher.iter(|| {
-            black_box(filled.admittance());
+            black_box(plate.admittance());
         });
     });
-    let mut responded = filled.admittance();
+    let mut response = plate.admittance();
     group.bench_function("wavenumber sum", |bencher| {
         bencher.iter(|| {
-            black_box(responded.sum());
+            black_box(response.sum());
         });
     });
-    let mut summed = responded.sum();
-    group.bench_function("time synthesis", |bencher| bencher.iter(|| summed.synthesis().is_ok()));
-    let observed = summed.synthesis().expect("a finite pressure");
-    group.bench_function("picking", |bencher| bencher.iter(|| observed.picking()));
+    let mut spectra = response.sum();
+    group.bench_function("time synthesis", |bencher| bencher.iter(|| spectra.synthesis().is_ok()));
+    let extrema = spectra.synthesis().expect("a finite pressure");
+    group.bench_function("picking", |bencher| bencher.iter(|| extrema.picking()));
 }
 
 criterion_group!(realization, methods, stages);

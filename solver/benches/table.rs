@@ -19,7 +19,11 @@ use osteon_common::settings::Method;
 use osteon_solver::stages::{StageWorkspace, Stages};
 use osteon_solver::{Isa, Solver, Workspace};
 
-mod measure;
+mod measure {
+    pub(crate) mod draws;
+    pub(crate) mod machine;
+    pub(crate) mod peak;
+}
 
 use measure::draws::{SEED, bones, ensemble, setup};
 use measure::{machine, peak};
@@ -134,20 +138,20 @@ fn measure_stages(stages: &Stages, times: &mut [[f64; STAGES.len()]]) -> usize {
         let mut clock = vec![Instant::now()];
         let bone = ensemble.bone(index as u64).expect("a bone");
         clock.push(Instant::now());
-        let mut filled = stages.tensor(&bone, &mut memory).expect("a plate");
+        let mut plate = stages.tensor(&bone, &mut memory).expect("a plate");
         clock.push(Instant::now());
-        let mut responded = filled.admittance();
+        let mut response = plate.admittance();
         clock.push(Instant::now());
-        let mut summed = responded.sum();
+        let mut spectra = response.sum();
         clock.push(Instant::now());
-        let observed = summed.synthesis().expect("a finite pressure");
+        let extrema = spectra.synthesis().expect("a finite pressure");
         clock.push(Instant::now());
-        observed.picking().expect("a velocity");
+        extrema.picking().expect("a velocity");
         clock.push(Instant::now());
         for (time, step) in times.iter_mut().zip(clock.windows(2)) {
             *time = time.min((step[1] - step[0]).as_secs_f64());
         }
-        pairs = filled.pairs();
+        pairs = plate.pairs();
     }
     pairs
 }

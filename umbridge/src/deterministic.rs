@@ -36,10 +36,8 @@ impl CaseSolver {
         setup: &Setup,
     ) -> Result<f64, ProtocolError> {
         let setup = point.setup(setup);
-        let bone = mean_bone(point, &setup).map_err(|error| ProtocolError {
-            no_value: true,
-            ..ProtocolError::input(format!("input[0]: {error}"))
-        })?;
+        let bone = mean_bone(point, &setup)
+            .map_err(|error| ProtocolError::input(format!("input[0]: {error}")).without_value())?;
         let _core = self.cores.acquire().await;
         let solver = self.solver(&setup);
         let solved = spawn_blocking(move || solver.arrival(&bone, &mut Workspace::default())).await;

@@ -145,7 +145,9 @@ impl Drop for RunningPoint {
 
 fn refused(error: ClientError) -> ProtocolError {
     match error {
-        ClientError::Violations(violations) => ProtocolError::outside(&violations),
+        ClientError::Violations(violations) => {
+            ProtocolError::violations(&violations).without_value()
+        }
         error => ProtocolError::output(error.to_string()),
     }
 }
@@ -177,10 +179,11 @@ fn result_of(
             let outcomes = samples.into_iter().next().unwrap_or_default().outcomes;
             Ok(PointResult { velocity, digest: found.digest, failures, outcomes })
         }
-        _ => Err(ProtocolError::infeasible(format!(
+        _ => Err(ProtocolError::output(format!(
             "{failed} of {count} realizations failed ({}); max_failed_fraction is {most:?}",
             counted(&failures)
-        ))),
+        ))
+        .without_value()),
     }
 }
 

@@ -143,9 +143,9 @@ impl ServedJob {
             ServedModel::Posterior => {
                 space.check_units(input)?;
                 let density = self.density(&space, config).await?;
-                let outside = || ProtocolError {
-                    no_value: true,
-                    ..ProtocolError::input("the input is outside the bounds of the job")
+                let outside = || {
+                    ProtocolError::input("the input is outside the bounds of the job")
+                        .without_value()
                 };
                 density.log_prior(&point).ok_or_else(outside)?;
                 let result = self.evaluated(&space, &point, config).await?;

@@ -156,12 +156,12 @@ impl<'a> InputSpace<'a> {
         }
     }
 
-    /// Returns the error for violations of the rules of jobs. Values that are set in `config` are not
-    /// a matter of the model's domain.
+    /// Returns the error for violations of the rules of jobs. The model has no value at the input, unless
+    /// a value of `config` is wrong.
     fn refusal(&self, violations: Violations) -> ProtocolError {
         let of_config = violations.has_at_or_below("monte_carlo");
-        let found = ProtocolError::outside(&violations.with_fields(|field| self.name(field)));
-        ProtocolError { no_value: !of_config, ..found }
+        let error = ProtocolError::violations(&violations.with_fields(|field| self.name(field)));
+        if of_config { error } else { error.without_value() }
     }
 
     /// Returns the name of a job's field in a request.

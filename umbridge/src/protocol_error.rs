@@ -15,7 +15,8 @@ pub(super) struct ProtocolError {
     pub(super) status: StatusCode,
     /// What is wrong, and what is allowed.
     pub(super) message: String,
-    /// Whether the request is well-formed, but the model has no value at its input.
+    /// Whether the request is well-formed, but the model has no value at its input; true
+    /// only after [`ProtocolError::without_value`].
     pub(super) no_value: bool,
 }
 
@@ -70,15 +71,15 @@ impl ProtocolError {
         Self::new(ProtocolErrorKind::InvalidOutput, message)
     }
 
-    /// Creates the error of an input at which the model is not defined.
-    pub(super) fn outside(violations: &Violations) -> Self {
+    /// Creates the error of a request whose job violates rules.
+    pub(super) fn violations(violations: &Violations) -> Self {
         let lines: Vec<String> = violations.iter().map(ToString::to_string).collect();
-        Self { no_value: true, ..Self::input(lines.join("; ")) }
+        Self::input(lines.join("; "))
     }
 
-    /// Creates the error of an input at which too many realizations failed.
-    pub(super) fn infeasible(message: impl Into<String>) -> Self {
-        Self { no_value: true, ..Self::output(message) }
+    /// Returns the same error for an input at which the model has no value.
+    pub(super) fn without_value(self) -> Self {
+        Self { no_value: true, ..self }
     }
 
     /// Returns the same error with another HTTP status.

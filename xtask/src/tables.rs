@@ -27,12 +27,10 @@ pub(crate) fn rewrite(named: &[String]) -> Result<()> {
     let path = root().join(PAGE);
     let read = || fs::read_to_string(&path).with_context(|| format!("cannot read {PAGE}"));
     let commands = commands(&read()?)?;
-    let is_named = |command: &str| named.iter().any(|name| command.split(' ').any(|w| w == name));
-    if let Some(name) =
-        named.iter().find(|name| !commands.iter().any(|c| c.split(' ').any(|w| w == *name)))
-    {
+    if let Some(name) = named.iter().find(|name| !commands.iter().any(|it| has_word(it, name))) {
         bail!("{PAGE} has no table of {name:?}; it has:\n  {}", commands.join("\n  "));
     }
+    let is_named = |command: &&String| named.iter().any(|name| has_word(command, name));
     for command in commands.iter().filter(|command| named.is_empty() || is_named(command)) {
         let mut run =
             cargo_command(&["run", "--quiet", "--release", "--package", "osteon-study", "--"]);
@@ -42,6 +40,11 @@ pub(crate) fn rewrite(named: &[String]) -> Result<()> {
             .with_context(|| format!("cannot write {PAGE}"))?;
     }
     Ok(())
+}
+
+/// Returns whether a command has this word, as the name of its study is one.
+fn has_word(command: &str, word: &str) -> bool {
+    command.split(' ').any(|it| it == word)
 }
 
 /// Returns the commands of all tables of a page.
@@ -94,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pages_own_tables_can_be_made() {
+    fn the_page_names_the_command_of_each_of_its_tables() {
         let page = fs::read_to_string(root().join(super::PAGE)).unwrap();
         let commands = commands(&page).unwrap();
         assert!(commands.len() > 5, "{commands:?}");

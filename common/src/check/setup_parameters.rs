@@ -11,8 +11,9 @@ use super::range::range;
 use super::setup::setup as check_setup;
 use super::value::known_wrong;
 
-/// Checks the parameters that not every job has. Both bounds must give a valid setup, also with the
-/// quantities that are random, so that no point of a search is without one.
+/// Checks the parameters that not every job has. Both bounds of each must give a valid setup, also with
+/// the quantities that are random. One is checked at a time, with the others at their starts: a rule that
+/// two of them break only together is not found here.
 pub(super) fn setup_parameters(specification: &JobSpecification, violations: &mut Violations) {
     for parameter in Parameter::OF_SETUP {
         let Some(quantity) = parameter.of_setup() else { continue };
@@ -40,20 +41,21 @@ pub(super) fn setup_parameters(specification: &JobSpecification, violations: &mu
     }
 }
 
-/// Checks the random quantities about the setup at the start, or about that of the job if the start is
-/// refused.
+/// Checks the random quantities, whose means are those of the setup at the start of the search, or those
+/// of the job's own setup if a parameter of the setup is refused.
 pub(super) fn random_setup(specification: &JobSpecification, violations: &mut Violations) {
     let JobSpecification { setup, random, .. } = specification;
     let is_wrong = |parameter: Parameter| {
         violations.has_at_or_below(&format!("parameters.{}", parameter.name()))
     };
-    let about = match Parameter::OF_SETUP.into_iter().any(is_wrong) {
+    let means = match Parameter::OF_SETUP.into_iter().any(is_wrong) {
         true => *setup,
         false => specification.start().setup(setup),
     };
-    random_quantities(random, &about, violations);
+    random_quantities(random, &means, violations);
 }
 
+/// Records the first violation of the setup in which `quantity` is at one of its `bounds`.
 fn ends(
     quantity: SetupQuantity,
     bounds: [f64; 2],

@@ -118,7 +118,7 @@ pub enum CloseReason {
     /// It was draining and has answered everything.
     #[error("this worker has drained")]
     Drained,
-    /// The coordinator is stopping.
+    /// The coordinator is shutting down. (Not a worker that drains.)
     #[error("the coordinator is shutting down; attach again when it is back")]
     Draining,
 }

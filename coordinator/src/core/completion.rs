@@ -29,8 +29,8 @@ pub struct Gathered {
     /// Number of the attempt at it.
     pub(crate) attempt: u64,
     pub(crate) record: EvaluationRecord,
-    /// Whether the evaluations stored after it belong to another path.
-    pub(crate) is_last: bool,
+    /// See [`Store::put_evaluation`](crate::store::Store::put_evaluation).
+    pub(crate) deletes_later: bool,
 }
 
 /// A completed evaluation.
@@ -39,32 +39,34 @@ pub struct Completed {
     pub(crate) job: JobId,
     /// Number of the attempt at it.
     pub(crate) attempt: u64,
-    pub(crate) after: Box<Search>,
+    /// The search, which has taken it in.
+    pub(crate) search: Box<Search>,
 }
 
 impl Completion {
-    /// Completes the evaluation, and calls `gathered` before the search has taken it in; `None` if it
-    /// was not settled. Takes a while, and depends on nothing else.
-    pub fn run(self, gathered: impl FnOnce(Gathered)) -> Option<Completed> {
-        let Self { job, evaluation, search: mut after } = self;
+    /// Completes the evaluation, and calls `gathered` before the search has taken it in. Takes a while,
+    /// and depends on nothing else.
+    #[expect(clippy::expect_used, reason = "the reactor hands out settled evaluations only")]
+    pub fn run(self, gathered: impl FnOnce(Gathered)) -> Completed {
+        let Self { job, evaluation, mut search } = self;
         let (number, attempt, point) = (evaluation.number, evaluation.attempt, evaluation.point);
-        let outcomes = evaluation.outcomes(after.observables())?;
+        let outcomes = evaluation.outcomes(search.observables()).expect("a settled evaluation");
         let (estimated_error, assessment) = thread::scope(|scope| {
             // The record needs the estimated errors but not the moments, so it is sent to the store first.
-            let assessed = scope.spawn(|| after.assess(&point, &outcomes));
+            let assessed = scope.spawn(|| search.assess(&point, &outcomes));
             let estimated_error = evaluation.estimated_error();
-            let is_last = evaluation.diverges_from_store(&outcomes);
+            let deletes_later = evaluation.diverges_from_store(&outcomes);
             let (outcomes, workers) = (outcomes.clone(), evaluation.workers.iter().cloned());
             let workers = workers.collect();
             let record =
                 EvaluationRecord { job, number, point, outcomes, estimated_error, workers };
-            gathered(Gathered { job, attempt, record, is_last });
+            gathered(Gathered { job, attempt, record, deletes_later });
             (estimated_error, assessed.join().unwrap_or_else(|panic| resume_unwind(panic)))
         });
         drop(evaluation);
-        after.anticipate(assessment);
-        after.tell(outcomes, estimated_error);
-        Some(Completed { job, attempt, after })
+        search.anticipate(assessment);
+        search.tell(outcomes, estimated_error);
+        Completed { job, attempt, search }
     }
 }
 

@@ -120,8 +120,8 @@ pub enum Record {
     Evaluation {
         /// The evaluation.
         record: EvaluationRecord,
-        /// Delete the evaluations stored after it: they belong to another path of the search.
-        is_last: bool,
+        /// See [`Store::put_evaluation`](crate::store::Store::put_evaluation).
+        deletes_later: bool,
     },
     /// Complete evaluations of a job with consecutive numbers, at least one. Evaluations stored after
     /// them are deleted.
@@ -150,9 +150,9 @@ pub enum Record {
 
 impl Record {
     /// Returns the record of evaluations with consecutive numbers, at least one.
-    pub(crate) fn of_evaluations(mut records: Vec<EvaluationRecord>, is_last: bool) -> Self {
+    pub(crate) fn of_evaluations(mut records: Vec<EvaluationRecord>, deletes_later: bool) -> Self {
         match records.pop() {
-            Some(record) if records.is_empty() => Self::Evaluation { record, is_last },
+            Some(record) if records.is_empty() => Self::Evaluation { record, deletes_later },
             last => {
                 records.extend(last);
                 Self::Evaluations(records)

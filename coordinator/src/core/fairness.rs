@@ -7,8 +7,6 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::core::policy::CHARGE_MAX;
-
 /// Computing time received by each client with a job under way.
 #[derive(Debug, Default)]
 pub(crate) struct Shares(BTreeMap<String, Share>);
@@ -66,12 +64,6 @@ impl Shares {
     }
 }
 
-/// Returns the computing time of `slots` slots over `seconds`, limited to [0, `CHARGE_MAX`].
-pub(crate) fn slot_time(seconds: f64, slots: u32) -> Duration {
-    let time = Duration::try_from_secs_f64(seconds * f64::from(slots));
-    time.unwrap_or(CHARGE_MAX).min(CHARGE_MAX)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,13 +85,5 @@ mod tests {
         shares.end("b");
         shares.begin("b");
         assert_eq!(shares.computing_time("b"), s(100));
-    }
-
-    #[test]
-    fn times_that_cannot_be_are_bounded() {
-        assert_eq!(slot_time(0.5, 4), Duration::from_secs(2));
-        for seconds in [f64::NAN, f64::INFINITY, 1e300, -1.0] {
-            assert_eq!(slot_time(seconds, 4), CHARGE_MAX);
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! A job in the coordinator: its progress, and the summary that remains when it has ended.
+//! A job in the coordinator: its progress, and what is known of it when it has ended.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -27,7 +27,7 @@ pub(crate) struct Job {
     pub(crate) record: JobRecord,
     /// Digest of its specification, to compare two submissions with the same request id.
     pub(crate) identity: SpecificationDigest,
-    /// What its workers prove that they compute rightly.
+    /// Key of its setup, for which its workers have to give a proof.
     pub(crate) setup: SetupKey,
     /// Approximate memory of its specification, bytes.
     pub(crate) bytes: u64,
@@ -52,9 +52,10 @@ pub(crate) struct Job {
     pub(crate) received: Option<EvaluationRecord>,
     /// A client has cancelled it; it ends as soon as the record that is being stored is durable.
     pub(crate) cancelled: bool,
+    /// Rate of the answers that its search needs, over the last seconds.
     pub(crate) rate: Rate,
-    /// Duration of its realizations.
-    pub(crate) pace: RealizationTime,
+    /// Time of one of its realizations on one slot.
+    pub(crate) realization_time: RealizationTime,
     /// The rate of all workers at it, as last measured.
     pub(crate) fleet: Option<FleetRate>,
     /// Number of workers that have answered a batch of it, each stay counted.
@@ -63,12 +64,14 @@ pub(crate) struct Job {
     pub(crate) newest_overdue_duplicate: Option<BatchId>,
     /// Sequence number of its last published snapshot.
     pub(crate) sequence: u64,
-    /// Time of its last answer, its beginning or its acceptance, whichever was last.
-    pub(crate) progressed: Duration,
+    /// Time of its last progress: its entry here, its beginning, an answer that its search needs, the
+    /// reading of a stored evaluation or the completion of one.
+    pub(crate) last_progress: Duration,
     /// Requests that are answered when the current record is durable: submissions at first,
     /// cancellations at the end.
     pub(crate) pending_replies: Vec<ReplyId>,
-    /// The bans of hosts that computed a part of an earlier result of it.
+    /// The doubts about its earlier result, if it is computed again because a host that contributed to it
+    /// was banned.
     pub(crate) doubts: Doubts,
     /// The store's refusal of the current record.
     pub(crate) store_retry: Option<StoreRetry>,
@@ -95,12 +98,12 @@ impl Job {
             received: None,
             cancelled: false,
             rate: Rate::default(),
-            pace: RealizationTime::default(),
+            realization_time: RealizationTime::default(),
             fleet: None,
             rated_workers: 0,
             newest_overdue_duplicate: None,
             sequence: sequence(0, now),
-            progressed: now,
+            last_progress: now,
             pending_replies: Vec::new(),
             doubts: Doubts::default(),
             store_retry: None,
@@ -130,6 +133,11 @@ impl Job {
         }
     }
 
+    /// Same as [`Job::evaluation`].
+    pub(crate) fn evaluation_mut(&mut self) -> Option<&mut PendingEvaluation> {
+        self.stage.evaluation_mut()
+    }
+
     /// Returns all evaluations under way; the one that the search asked for comes first.
     pub(crate) fn evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
         self.certain_evaluations().chain(&self.speculation.evaluations)
@@ -140,14 +148,11 @@ impl Job {
         self.evaluation().into_iter().chain(self.ahead.evaluations())
     }
 
+    /// Same as [`Job::certain_evaluations`].
     pub(crate) fn certain_evaluations_mut(
         &mut self,
     ) -> impl Iterator<Item = &mut PendingEvaluation> {
-        let asked_for = match &mut self.stage {
-            Stage::Computing(evaluation) => Some(evaluation),
-            _ => None,
-        };
-        asked_for.into_iter().chain(self.ahead.evaluations_mut())
+        self.stage.evaluation_mut().into_iter().chain(self.ahead.evaluations_mut())
     }
 
     /// Returns the one of [`Job::certain_evaluations`] with this attempt.
@@ -155,6 +160,7 @@ impl Job {
         self.certain_evaluations().find(|evaluation| evaluation.attempt == attempt)
     }
 
+    /// Same as [`Job::certain_evaluation`].
     pub(crate) fn certain_evaluation_mut(
         &mut self,
         attempt: u64,
@@ -162,13 +168,10 @@ impl Job {
         self.certain_evaluations_mut().find(|evaluation| evaluation.attempt == attempt)
     }
 
+    /// Same as [`Job::evaluations`].
     pub(crate) fn evaluations_mut(&mut self) -> impl Iterator<Item = &mut PendingEvaluation> {
-        let asked_for = match &mut self.stage {
-            Stage::Computing(evaluation) => Some(evaluation),
-            _ => None,
-        };
-        let ahead = self.ahead.evaluations_mut();
-        asked_for.into_iter().chain(ahead).chain(&mut self.speculation.evaluations)
+        let certain = self.stage.evaluation_mut().into_iter().chain(self.ahead.evaluations_mut());
+        certain.chain(&mut self.speculation.evaluations)
     }
 }
 
@@ -212,16 +215,16 @@ pub(crate) enum Stage {
     /// A complete evaluation is being stored.
     StoringEvaluation {
         record: EvaluationRecord,
-        /// Evaluations stored after it belong to another path of the search and are deleted.
-        is_last: bool,
+        /// See [`Store::put_evaluation`](crate::store::Store::put_evaluation).
+        deletes_later: bool,
     },
     /// Evaluations are being stored that were complete before the search asked for them, or are completed
     /// beside the core. Once they are durable, the search is replaced by the one that has taken them in.
     StoringPrepared {
         /// The evaluations, with consecutive numbers; not empty.
         records: Vec<EvaluationRecord>,
-        /// Evaluations stored after them belong to another path of the search and are deleted.
-        is_last: bool,
+        /// See [`Store::put_evaluation`](crate::store::Store::put_evaluation), of the last of them.
+        deletes_later: bool,
         /// The search after them.
         after: After,
     },
@@ -230,7 +233,15 @@ pub(crate) enum Stage {
 }
 
 impl Stage {
-    /// Whether a record of the job is not durable yet, or about to be made.
+    /// Returns the evaluation whose batches are sent to workers.
+    fn evaluation_mut(&mut self) -> Option<&mut PendingEvaluation> {
+        match self {
+            Self::Computing(evaluation) => Some(evaluation),
+            _ => None,
+        }
+    }
+
+    /// Returns whether a record of the job is not durable yet, or about to be made.
     pub(crate) fn is_storing(&self) -> bool {
         matches!(
             self,
@@ -320,16 +331,17 @@ pub(crate) struct EndedJob {
     pub(crate) realizations: u64,
     /// Time of acceptance, since the Unix epoch.
     pub(crate) accepted: Duration,
-    /// Sequence number of its last snapshot.
+    /// Sequence number of the snapshot that shows its end, or of a later one.
     pub(crate) sequence: u64,
     pub(crate) end: EndRecord,
-    /// What was found out about its hosts since.
+    /// The doubts about its result: bans, since its end, of hosts that contributed to it.
     pub(crate) doubts: Doubts,
 }
 
 impl EndedJob {
-    /// Returns the summary of an ended job whose last snapshot has number `sequence`.
-    pub(crate) fn new(record: &JobRecord, end: EndRecord, sequence: u64) -> Self {
+    /// Returns what lists show of a job after its end. `last_sequence` is the number of its last snapshot
+    /// before the end; that of the end is published next.
+    pub(crate) fn new(record: &JobRecord, end: EndRecord, last_sequence: u64) -> Self {
         let specification = &record.specification;
         Self {
             request: RequestName::from_record(record),
@@ -341,7 +353,7 @@ impl EndedJob {
             max_evaluations: specification.evaluations_max(),
             realizations: specification.monte_carlo.realizations,
             accepted: record.accepted,
-            sequence: self::sequence(sequence, end.ended),
+            sequence: sequence(last_sequence, end.ended),
             end,
             doubts: Doubts::default(),
         }

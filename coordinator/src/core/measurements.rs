@@ -121,7 +121,10 @@ fn slots_wanted(job: &Job) -> u64 {
         (Stage::Computing(evaluation), JobKind::Propagation) => all - evaluation.filled().min(all),
         _ => all.saturating_mul(job.search.parts().saturating_sub(job.search.part())),
     };
-    let each = job.pace.expected_time(1, 1).map_or(REALIZATION_USUAL_S, |time| time.as_secs_f64());
+    let each = job
+        .realization_time
+        .expected_time(1, 1)
+        .map_or(REALIZATION_USUAL_S, |time| time.as_secs_f64());
     let worth = (realizations as f64 * each / BATCH_WORTH_S).ceil();
     // `as` saturates.
     (worth as u64).clamp(realizations.min(1), realizations)

@@ -80,7 +80,7 @@ pub enum Notice {
         /// Time since its acceptance.
         elapsed: Duration,
     },
-    /// Something may soon be refused, or is already.
+    /// A warning of [`core::concerns`](crate::core::concerns) has become due.
     Concern {
         /// A sentence.
         text: String,
@@ -94,7 +94,7 @@ pub enum Departure {
     Closed(CloseReason),
     /// Its stream ended.
     StreamEnded,
-    /// Its stream ended after it had begun to drain.
+    /// It was draining, and its stream ended, or was closed because it no longer read.
     Left,
 }
 
@@ -116,8 +116,8 @@ impl Departure {
 }
 
 impl Notice {
-    /// Writes the notice to the log. Texts that a peer sent are quoted, so that they cannot look
-    /// like another line.
+    /// Writes the notice to the log. A text that a peer sent is recorded as a string, never with
+    /// `%`: the subscriber quotes strings, so that none can look like another line.
     pub(crate) fn write(&self) {
         match self {
             Self::WorkerAttached { worker, name, slots, version } => tracing::info!(
@@ -142,7 +142,7 @@ impl Notice {
                 }
             }
             Self::JobAccepted { job, client, name, kind, priority } => tracing::info!(
-                %job, user = client.as_str(), name = name.as_str(), kind = kind_name(*kind), priority,
+                %job, user = client.as_str(), name = name.as_str(), kind = kind.name(), priority,
                 "job accepted"
             ),
             Self::JobStarted { job, stored } => tracing::info!(
@@ -150,17 +150,10 @@ impl Notice {
             ),
             Self::Concern { text } => tracing::warn!("{text}"),
             Self::JobEnded { job, client, kind, ending, evaluations, elapsed } => tracing::info!(
-                %job, user = client.as_str(), kind = kind_name(*kind), status = ending.status.name(),
+                %job, user = client.as_str(), kind = kind.name(), status = ending.status.name(),
                 reason = ending.reason.as_deref().unwrap_or_default(), evaluations,
                 elapsed_s = elapsed.as_secs_f64(), "job ended"
             ),
         }
-    }
-}
-
-fn kind_name(kind: JobKind) -> &'static str {
-    match kind {
-        JobKind::Identification => "identification",
-        JobKind::Propagation => "propagation",
     }
 }

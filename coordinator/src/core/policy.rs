@@ -46,8 +46,8 @@ pub(crate) const DELAY_WEIGHT: f64 = 1.0 / 16.0;
 pub(crate) const DELAY_MAX_S: f64 = 2.0;
 /// Shortest computing time of a batch that a worker is believed to have needed, s.
 pub(crate) const ELAPSED_MIN_S: f64 = 1e-6;
-/// Longest computing time that a client is charged for a batch, whatever the worker reports.
-pub(crate) const CHARGE_MAX: Duration = Duration::from_secs(86_400);
+/// Longest computing time of a batch that is estimated or charged to a client, whatever the worker reports.
+pub(crate) const DURATION_MAX: Duration = Duration::from_secs(86_400);
 
 // ---- Late answers ----
 

@@ -10,7 +10,7 @@
 //! one that tells sound from broken hosts. So a later host decides what two could not, and until then no
 //! result of theirs counts.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -55,10 +55,12 @@ pub(crate) struct SetupProofs {
     input: Arc<EvaluationInput>,
     /// The votes of the hosts.
     pub(crate) ballot: Ballot,
+    /// The batches that workers have not answered yet.
     pub(crate) out: BTreeMap<WorkerId, BatchId>,
-    /// The workers that have given theirs, in this stay or an earlier one.
-    given: BTreeSet<WorkerName>,
-    /// Time since which hosts have voted differently, and no answer has a majority.
+    /// The workers that have given their proof, in any of their stays, with the time of the last one.
+    given: BTreeMap<WorkerName, Duration>,
+    /// Time since which at least two hosts have voted, and no answer has the votes of a majority of those
+    /// that have voted or are asked.
     pub(crate) undecided_since: Option<Duration>,
     /// Time of their last use.
     used: Duration,
@@ -80,23 +82,28 @@ impl SetupProofs {
         self.input.id
     }
 
-    /// Records that a worker has given its proof.
-    pub(crate) fn give(&mut self, name: &WorkerName) {
-        if self.given.len() >= PROVEN_WORKERS_MAX {
-            self.given.pop_first();
+    /// Records that a worker has given its proof. If too many have, the one that gave it longest ago is
+    /// forgotten: should it count again, it is asked for another proof, or an answer of it is audited. As far
+    /// fewer are attached than are remembered, workers that are asked again do not make each other forgotten.
+    pub(crate) fn give(&mut self, name: &WorkerName, now: Duration) {
+        if self.given.len() >= PROVEN_WORKERS_MAX && !self.given.contains_key(name) {
+            let longest_ago = self.given.iter().min_by_key(|(_, time)| **time);
+            if let Some(name) = longest_ago.map(|(name, _)| name.clone()) {
+                self.given.remove(&name);
+            }
         }
-        self.given.insert(name.clone());
+        self.given.insert(name.clone(), now);
     }
 
     /// Returns whether a worker has given its proof, in any of its stays.
     pub(crate) fn is_given_by(&self, name: &WorkerName) -> bool {
-        self.given.contains(name)
+        self.given.contains_key(name)
     }
 
     /// Removes what a banned host has given.
     fn withdraw(&mut self, host: &str) {
         self.ballot.withdraw(host);
-        self.given.retain(|name| name.host() != host);
+        self.given.retain(|name, _| name.host() != host);
         self.undecided_since = None;
     }
 }
@@ -145,7 +152,7 @@ impl Proofs {
             input: Arc::new(input),
             ballot: Ballot::new(indices),
             out: BTreeMap::new(),
-            given: BTreeSet::new(),
+            given: BTreeMap::new(),
             undecided_since: None,
             used: now,
         };
@@ -159,7 +166,7 @@ impl Proofs {
         (input, ballot): (EvaluationInput, Ballot),
         now: Duration,
     ) {
-        let given = ballot.voters().cloned().collect();
+        let given = ballot.voters().map(|name| (name.clone(), now)).collect();
         let (input, out) = (Arc::new(input), BTreeMap::new());
         let undecided_since = None;
         self.0.insert(setup, SetupProofs { input, ballot, out, given, undecided_since, used: now });
@@ -187,5 +194,40 @@ impl Proofs {
     /// Returns the setups whose proofs are known.
     pub(crate) fn setups(&self) -> impl Iterator<Item = &SetupKey> {
         self.0.keys()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::job::MonteCarlo;
+
+    use super::*;
+
+    /// When no more can be remembered, the names that come first are forgotten once and not by turns.
+    #[test]
+    fn a_worker_that_gives_its_proof_again_is_remembered() {
+        let mut proofs = Proofs::default();
+        let (key, point) = (SetupKey([0; 32]), Point::of_bone([1.0; 7]));
+        let input = EvaluationInput {
+            id: 0,
+            setup: Default::default(),
+            point,
+            germs: MonteCarlo::default().germs(),
+            random: Default::default(),
+            observables: Default::default(),
+        };
+        proofs.begin(key, (input, 1), Duration::ZERO);
+        let proofs = proofs.for_setup_mut(&key).unwrap();
+        let name = |process: usize| WorkerName::new("a", process as u32, 0);
+        let mut seconds = 0;
+        let mut give = |process: usize| {
+            seconds += 1;
+            proofs.give(&name(process), Duration::from_secs(seconds));
+        };
+        (0..=PROVEN_WORKERS_MAX).for_each(&mut give);
+        [0, 1].into_iter().for_each(give);
+        assert_eq!(proofs.given.len(), PROVEN_WORKERS_MAX);
+        let remembered = [0, 1, 2, 3].map(|process| proofs.is_given_by(&name(process)));
+        assert_eq!(remembered, [true, true, false, true]);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::core::fairness;
+use crate::core::bounded_duration::bounded_duration;
 use crate::core::policy::REALIZATION_TIME_KEPT;
 
 /// Time of one realization of a job on one slot. A slow answer raises the estimate at once, a fast
@@ -28,7 +28,7 @@ impl RealizationTime {
     /// Returns the expected time of `count` realizations on a worker with `slots` slots; `None`
     /// before the first answer.
     pub(crate) fn expected_time(self, count: u64, slots: u32) -> Option<Duration> {
-        self.0.map(|one| fairness::slot_time(one * rounds_per_slot(count, slots), 1))
+        self.0.map(|one| bounded_duration(one * rounds_per_slot(count, slots)))
     }
 }
 
@@ -43,23 +43,23 @@ mod tests {
 
     #[test]
     fn slow_answers_count_at_once_and_fast_ones_by_and_by() {
-        let mut pace = RealizationTime::default();
-        assert_eq!((pace.expected_time(8, 2), pace.is_known()), (None, false));
-        let expected = |pace: RealizationTime, count, slots| {
-            pace.expected_time(count, slots).unwrap().as_secs_f64()
+        let mut time = RealizationTime::default();
+        assert_eq!((time.expected_time(8, 2), time.is_known()), (None, false));
+        let expected = |time: RealizationTime, count, slots| {
+            time.expected_time(count, slots).unwrap().as_secs_f64()
         };
         // 8 realizations on 2 slots in 2 s: 0.5 s each.
-        pace.learn(8, 2, 2.0);
+        time.learn(8, 2, 2.0);
         for (count, slots, seconds) in [(8, 2, 2.0), (1, 1, 0.5), (1, 64, 0.5), (16, 4, 2.0)] {
-            assert_eq!(expected(pace, count, slots), seconds, "{count} on {slots}");
+            assert_eq!(expected(time, count, slots), seconds, "{count} on {slots}");
         }
-        pace.learn(1, 64, 32.0);
-        assert_eq!(expected(pace, 1, 1), 32.0);
-        pace.learn(1, 1, 0.5);
-        assert_eq!(expected(pace, 1, 1), 16.0);
+        time.learn(1, 64, 32.0);
+        assert_eq!(expected(time, 1, 1), 32.0);
+        time.learn(1, 1, 0.5);
+        assert_eq!(expected(time, 1, 1), 16.0);
         for _ in 0..100 {
-            pace.learn(1, 1, 0.5);
+            time.learn(1, 1, 0.5);
         }
-        assert_eq!(expected(pace, 1, 1), 0.5);
+        assert_eq!(expected(time, 1, 1), 0.5);
     }
 }

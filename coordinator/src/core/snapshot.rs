@@ -136,7 +136,7 @@ fn describe_wait(state: &State, job: &Job, now: Duration) -> String {
             "its turn: {} jobs run and {} wait {}",
             state.active.len(),
             state.waiting.len(),
-            since(job.progressed)
+            since(job.last_progress)
         ),
         Stage::Replaying { .. } => format!(
             "its stored evaluations, {} of {} are read again",
@@ -158,9 +158,10 @@ fn describe_wait(state: &State, job: &Job, now: Duration) -> String {
             let asked = asked.map_or_else(String::new, |it| format!("; {} is asked", it.name));
             format!("{what} {}{asked}", since(begun.unwrap_or(now)))
         }
-        Stage::Computing(_) if now.saturating_sub(job.progressed) >= PATIENCE => {
-            oldest_answer(state, job, since)
-                .unwrap_or_else(|| format!("a worker that takes batches {}", since(job.progressed)))
+        Stage::Computing(_) if now.saturating_sub(job.last_progress) >= PATIENCE => {
+            oldest_answer(state, job, since).unwrap_or_else(|| {
+                format!("a worker that takes batches {}", since(job.last_progress))
+            })
         }
         Stage::Computing(_) if !unfit.is_empty() => format!("nothing; {unfit}"),
         Stage::StoringSubmission
@@ -181,7 +182,7 @@ fn oldest_answer(state: &State, job: &Job, since: impl Fn(Duration) -> String) -
     let others = batch.duplicates.len();
     let instead = match others {
         0 if !state.overdue.contains(id) => String::new(),
-        0 if job.pace.is_known() => {
+        0 if job.realization_time.is_known() => {
             "; it is overdue, and no other worker has taken it over".to_owned()
         }
         // The first answer may just take this long.

@@ -22,7 +22,7 @@ use crate::core::evaluation::PendingEvaluation;
 use crate::core::event::Hello;
 use crate::core::fairness::Shares;
 use crate::core::ids::{BatchId, JobId, LeaseId, WorkerId};
-use crate::core::job::{EndedJob, Job, RequestName, Stage};
+use crate::core::job::{EndedJob, Job, RequestName};
 use crate::core::notice::Departure;
 use crate::core::policy::{LOST_IN_A_ROW_MAX, SETTLED_MAX};
 use crate::core::probation::Probation;
@@ -291,10 +291,7 @@ impl State {
 
     /// Returns the evaluation that the job's search asked for, while it is under way.
     pub(crate) fn evaluation_mut(&mut self, job: JobId) -> Option<&mut PendingEvaluation> {
-        match &mut self.jobs.get_mut(&job)?.stage {
-            Stage::Computing(evaluation) => Some(evaluation),
-            _ => None,
-        }
+        self.jobs.get_mut(&job)?.evaluation_mut()
     }
 
     /// Returns the evaluation of an assignment while this attempt at it is under way.

@@ -17,7 +17,7 @@ use crate::core::reactor::react;
 use crate::core::snapshot;
 use crate::core::state::State;
 use crate::service::accept::Places;
-use crate::service::failing::{ComponentFailure, FailureReporter};
+use crate::service::failure_reporter::{ComponentFailure, FailureReporter};
 use crate::service::job_spans::JobSpans;
 use crate::service::meter::{CoreReport, Meter};
 use crate::service::outbound::{self, EvaluationMessages, NotReading, Outbound};
@@ -86,7 +86,7 @@ pub(crate) struct Core {
     evaluations: EvaluationMessages,
     on_stop: Option<oneshot::Sender<()>>,
     stopped: bool,
-    failing: FailureReporter,
+    failures: FailureReporter,
     /// Present if metrics are exported.
     meter: Option<Meter>,
     /// Present if spans are recorded.
@@ -101,7 +101,7 @@ impl Core {
         commands: mpsc::Sender<StoreCommand>,
         events: mpsc::Sender<Event>,
         places: Places,
-        failing: FailureReporter,
+        failures: FailureReporter,
         Monitoring { meter, spans }: Monitoring,
     ) -> Self {
         let config = state.config;
@@ -118,7 +118,7 @@ impl Core {
             evaluations: EvaluationMessages::default(),
             on_stop: None,
             stopped: false,
-            failing,
+            failures,
             meter,
             spans,
             config,
@@ -285,7 +285,7 @@ impl Core {
                 Effect::Note(notice) => notice.write(),
                 Effect::Publish { job, snapshot } => self.publish(job, snapshot),
                 Effect::ReportStoreFailure { error, waited } => {
-                    self.failing.report(ComponentFailure::StoreRefuses { error, waited });
+                    self.failures.report(ComponentFailure::StoreRefuses { error, waited });
                 }
                 Effect::Stop => self.stop(),
             }
@@ -306,7 +306,7 @@ impl Core {
             // The receiver is gone when the coordinator has stopped.
             let report = |event| drop(events.blocking_send(event));
             let completed = completion.run(|gathered| report(Event::Gathered(gathered)));
-            completed.into_iter().map(Event::Completed).for_each(report);
+            report(Event::Completed(completed));
         });
     }
 

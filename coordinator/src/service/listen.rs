@@ -58,7 +58,7 @@ pub enum BindError {
         address: SocketAddr,
     },
     /// The operating system refused a TCP address.
-    #[error("cannot listen on {address}: {source}; choose another port, or port 0")]
+    #[error("cannot listen on {address}: {source}{}", tcp_advice(source.kind()))]
     Tcp {
         /// The address.
         address: SocketAddr,
@@ -88,6 +88,17 @@ pub enum BindError {
         /// The path.
         path: PathBuf,
     },
+}
+
+/// Returns what to do about an error of this kind, as the end of its message.
+fn tcp_advice(kind: io::ErrorKind) -> &'static str {
+    match kind {
+        io::ErrorKind::AddrInUse | io::ErrorKind::PermissionDenied => {
+            "; choose another port, or port 0"
+        }
+        io::ErrorKind::AddrNotAvailable => "; this machine has no such address",
+        _ => "",
+    }
 }
 
 /// A bound address, ready to be served by [`crate::start`].
@@ -122,7 +133,8 @@ impl Listener {
     /// A socket file that nobody listens on, left by a killed process, is replaced.
     ///
     /// # Errors
-    /// When the address is not a local one, in use, or refused by the operating system.
+    /// If other machines can reach the address and `insecure` is false, if it is in use, or if the operating
+    /// system refuses it.
     pub async fn bind(address: &ListenAddress, insecure: bool) -> Result<Self, BindError> {
         match address {
             ListenAddress::Tcp(address) => Self::bind_tcp(*address, insecure).await,
@@ -140,9 +152,7 @@ impl Listener {
         tls: Tls,
         tokens: Tokens,
     ) -> Result<Self, BindError> {
-        let refused = |source| BindError::Tcp { address, source };
-        let listener = TcpListener::bind(address).await.map_err(refused)?;
-        let local = listener.local_addr().map_err(refused)?;
+        let (listener, local) = bind_port(address).await?;
         let url = match tls.host() {
             // The wildcard address stands for all addresses of this machine, so it cannot be part
             // of a URL.
@@ -188,10 +198,8 @@ impl Listener {
         if !address.ip().is_loopback() && !insecure {
             return Err(BindError::NotLoopback { address });
         }
-        let refused = |source| BindError::Tcp { address, source };
-        let listener = TcpListener::bind(address).await.map_err(refused)?;
-        let url = url(listener.local_addr().map_err(refused)?).await;
-        Ok(Self::for_everybody(BoundSocket::Tcp(listener), None, url))
+        let (listener, local) = bind_port(address).await?;
+        Ok(Self::for_everybody(BoundSocket::Tcp(listener), None, url(local).await))
     }
 
     async fn bind_unix(path: &Path) -> Result<Self, BindError> {
@@ -247,6 +255,16 @@ impl FromStr for ListenAddress {
         };
         numeric.parse().map(Self::Tcp).map_err(|_| unreadable())
     }
+}
+
+/// Binds a TCP address, and returns it with the port that it has.
+async fn bind_port(address: SocketAddr) -> Result<(TcpListener, SocketAddr), BindError> {
+    let bind = async {
+        let listener = TcpListener::bind(address).await?;
+        let local = listener.local_addr()?;
+        Ok::<_, io::Error>((listener, local))
+    };
+    bind.await.map_err(|source| BindError::Tcp { address, source })
 }
 
 /// Returns the URL of an address. For a wildcard address it contains the machine's name, if that
@@ -340,6 +358,20 @@ mod tests {
         let known = tokio::net::lookup_host((name.as_str(), 1)).await.is_ok();
         assert_eq!(host, if known { &name } else { "0.0.0.0" });
         tokio::net::TcpStream::connect(&address).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn an_address_that_cannot_be_bound_is_refused_with_what_to_do() {
+        let taken = Listener::bind(&"127.0.0.1:0".parse().unwrap(), false).await.unwrap();
+        let taken = taken.url().strip_prefix("http://").unwrap().to_owned();
+        // 192.0.2.0/24 is for documentation: no machine has an address of it.
+        for (address, expected) in [
+            (taken.as_str(), "; choose another port, or port 0"),
+            ("192.0.2.1:0", "; this machine has no such address"),
+        ] {
+            let error = Listener::bind(&address.parse().unwrap(), true).await.unwrap_err();
+            assert!(error.to_string().ends_with(expected), "{error}");
+        }
     }
 
     #[tokio::test]

@@ -29,7 +29,7 @@ use crate::metrics::write_times::WriteTimes;
 use crate::service::accept::{self, Places};
 use crate::service::beside::{BesideKind, BesideTask, SharedParts};
 use crate::service::core_task::{Clock, Core, Message, Monitoring};
-use crate::service::failing::{ComponentFailure, FailureReporter, Guard};
+use crate::service::failure_reporter::{ComponentFailure, FailureReporter, Guard};
 use crate::service::job_spans::JobSpans;
 use crate::service::jobs::JobsService;
 use crate::service::listen::Listener;
@@ -82,7 +82,7 @@ pub enum StartError {
 #[derive(Debug)]
 pub struct Coordinator {
     url: String,
-    failing: FailureReporter,
+    failures: FailureReporter,
     messages: mpsc::Sender<Message>,
     policy: watch::Sender<Arc<Policy>>,
     tls: Option<watch::Sender<Tls>>,
@@ -118,7 +118,7 @@ pub async fn start(
     );
     let (state, effects) = State::restore(config, restored, clock.now());
 
-    let failing = FailureReporter::new();
+    let failures = FailureReporter::new();
     let (messages, inbox) = mpsc::channel(EVENTS_MAX);
     let (events, from_store) = mpsc::channel(EVENTS_MAX);
     let write_times = WriteTimes::default();
@@ -126,7 +126,7 @@ pub async fn start(
         store,
         events.clone(),
         write_times.clone(),
-        failing.guard(ComponentFailure::Store),
+        failures.guard(ComponentFailure::Store),
     )
     .map_err(|source| StartError::Thread { source })?;
     let listener_spans = listener.spans.take();
@@ -146,17 +146,17 @@ pub async fn start(
     let (stop_serving, stopped) = oneshot::channel();
     let places = Places::for_coordinator();
     let server = serve(router, listener, shown, places.clone(), stopped);
-    let server = tokio::spawn(run_guarded(failing.guard(ComponentFailure::Server), server));
-    let guard = failing.guard(ComponentFailure::Core);
+    let server = tokio::spawn(run_guarded(failures.guard(ComponentFailure::Server), server));
+    let guard = failures.guard(ComponentFailure::Core);
     let meter = (!beside.is_empty()).then(Meter::default);
     let monitoring = Monitoring { meter, spans: listener_spans.map(JobSpans::new) };
-    let core = Core::new(state, clock, commands, events, places, failing.clone(), monitoring);
+    let core = Core::new(state, clock, commands, events, places, failures.clone(), monitoring);
     let core = core.run(effects, inbox, from_store, config.tick);
     let core = tokio::spawn(run_guarded(guard, core));
     tracing::info!(%url, "listening");
     Ok(Coordinator {
         url,
-        failing,
+        failures,
         messages,
         policy,
         tls,
@@ -213,7 +213,7 @@ impl Coordinator {
     /// record for [`Config::store_give_up_after`]; otherwise the future never completes. The coordinator
     /// cannot continue then: shut it down and report the reason.
     pub fn failed(&self) -> impl Future<Output = ComponentFailure> + Send + use<> {
-        self.failing.first()
+        self.failures.first()
     }
 
     /// Sends no new batch, closes every stream and stores everything complete. Waits for that at most
@@ -223,7 +223,7 @@ impl Coordinator {
         if std::mem::replace(&mut self.drained, true) {
             return;
         }
-        self.failing.disarm();
+        self.failures.disarm();
         let stop = async {
             let (reply, stopped) = oneshot::channel();
             if self.messages.send(Message::Shutdown(reply)).await.is_ok() {

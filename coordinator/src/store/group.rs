@@ -118,7 +118,9 @@ fn outcome(record: &Record, put: Result<(), StoreError>) -> Event {
 fn put(store: &mut dyn Store, record: &Record) -> Result<(), StoreError> {
     match record {
         Record::Job(record) => store.put_job(record),
-        Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
+        Record::Evaluation { record, deletes_later } => {
+            store.put_evaluation(record, *deletes_later)
+        }
         Record::Evaluations(records) => store.put_evaluations(records),
         Record::Part(record) => store.put_part(record),
         Record::Piece { record, .. } => store.put_piece(record),

@@ -84,13 +84,13 @@ impl Store for MemoryStore {
     fn put_evaluation(
         &mut self,
         record: &EvaluationRecord,
-        is_last: bool,
+        deletes_later: bool,
     ) -> Result<(), StoreError> {
         let mut content = self.content();
         let EvaluationRecord { job, number: last, .. } = *record;
         content.evaluations.insert((job, last), record.clone());
         content.parts.retain(|part| part.job != job || !same_point(&part.point, &record.point));
-        if is_last {
+        if deletes_later {
             content.evaluations.retain(|(of, number), _| *of != job || *number <= last);
         }
         Ok(())

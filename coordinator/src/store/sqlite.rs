@@ -44,6 +44,13 @@ use job_row::{damaged_end, job_columns, job_record};
 use log::Log;
 use parts::StaleParts;
 
+/// A group whose records are being put.
+#[derive(Debug, Clone, Copy, Default)]
+struct OpenGroup {
+    /// The highest job among them, which the mark names once the group is durable.
+    highest_job: Option<JobId>,
+}
+
 /// A store in a SQLite file.
 #[derive(Debug)]
 pub struct SqliteStore {
@@ -53,9 +60,8 @@ pub struct SqliteStore {
     lock: File,
     /// Mark of the acknowledged jobs.
     mark: RefCell<Mark>,
-    /// While a group is put: the highest job in it, which the mark names once the group is durable;
-    /// 0 if there is none.
-    group: Cell<Option<JobId>>,
+    /// The group that is being put, if one is.
+    group: Cell<Option<OpenGroup>>,
     log: Log,
     stale: RefCell<StaleParts>,
 }
@@ -333,13 +339,13 @@ impl Store for &SqliteStore {
     fn put_evaluation(
         &mut self,
         record: &EvaluationRecord,
-        is_last: bool,
+        deletes_later: bool,
     ) -> Result<(), StoreError> {
         let (job, number) = (record.job, record.number);
         self.change(|connection| {
             let point = evaluation_rows::put(connection, record)?;
             self.stale.borrow_mut().add_at(connection, job, &point)?;
-            if is_last {
+            if deletes_later {
                 evaluation_rows::delete_after(connection, job, number)?;
             }
             Ok(())

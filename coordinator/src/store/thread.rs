@@ -16,7 +16,7 @@ use crate::core::effect::Record;
 use crate::core::event::{Event, ReadFailure};
 use crate::core::ids::{JobId, ReplyId};
 use crate::metrics::write_times::WriteTimes;
-use crate::service::failing::Guard;
+use crate::service::failure_reporter::Guard;
 use crate::store::group::Group;
 use crate::store::job_output::ReadRequest;
 use crate::store::{Store, StoreError};

@@ -426,7 +426,7 @@ impl Clockwork {
         let mut gathered = None;
         let completed = completion.run(|outcomes| gathered = Some(outcomes));
         self.react(Event::Gathered(gathered.unwrap()));
-        self.after(RECORD, Occurrence::Completed(completed.unwrap()));
+        self.after(RECORD, Occurrence::Completed(completed));
     }
 
     fn react(&mut self, event: Event) {

@@ -110,7 +110,9 @@ pub(crate) fn wire_hello(process: u32) -> WorkerHello {
 pub(crate) fn written(store: &mut dyn Store, record: &Record) -> Event {
     match record {
         Record::Job(record) => store.put_job(record),
-        Record::Evaluation { record, is_last } => store.put_evaluation(record, *is_last),
+        Record::Evaluation { record, deletes_later } => {
+            store.put_evaluation(record, *deletes_later)
+        }
         Record::Evaluations(records) => store.put_evaluations(records),
         Record::Part(record) => store.put_part(record),
         Record::Piece { record, .. } => store.put_piece(record),

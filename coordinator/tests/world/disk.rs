@@ -35,7 +35,9 @@ impl World {
                     self.deceived.remove(&end.job);
                 }
             }
-            Record::Evaluation { record, is_last } => self.look_at_evaluation(record, *is_last),
+            Record::Evaluation { record, deletes_later } => {
+                self.look_at_evaluation(record, *deletes_later)
+            }
             Record::Evaluations(records) => {
                 self.counts.prepared += records.len() as u64;
                 records.iter().for_each(|record| self.look_at_evaluation(record, true));
@@ -45,7 +47,7 @@ impl World {
         }
     }
 
-    fn look_at_evaluation(&mut self, record: &EvaluationRecord, is_last: bool) {
+    fn look_at_evaluation(&mut self, record: &EvaluationRecord, deletes_later: bool) {
         let before = self.store.evaluation(record.job, record.number).unwrap();
         if let Some(before) = before.filter(|before| before.workers != record.workers) {
             // On another path of the search a point may differ in its last bits only, and have
@@ -55,7 +57,7 @@ impl World {
             self.counts.confirmed += u64::from(same);
             // The contents of a damaged record are unknown.
             let damaged = self.damaged.contains(&(record.job, record.number));
-            assert!(damaged || is_last != same, "{record:?}");
+            assert!(damaged || deletes_later != same, "{record:?}");
         }
     }
 
@@ -79,7 +81,9 @@ impl World {
     /// Handles a record that has become durable.
     pub(super) fn written(&mut self, record: &Record) -> Event {
         match record {
-            Record::Evaluation { record, is_last } => self.note_durable(record, *is_last),
+            Record::Evaluation { record, deletes_later } => {
+                self.note_durable(record, *deletes_later)
+            }
             Record::Evaluations(records) => {
                 records.iter().for_each(|record| self.note_durable(record, true));
             }
@@ -117,11 +121,11 @@ impl World {
         self.within(5, Occurrence::Report(Event::Reopened { reply_id, job, outcome }));
     }
 
-    fn note_durable(&mut self, record: &EvaluationRecord, is_last: bool) {
+    fn note_durable(&mut self, record: &EvaluationRecord, deletes_later: bool) {
         self.damaged.remove(&(record.job, record.number));
         if let Some(seed) = self.seeds.get(&record.job) {
             let durable = self.durable.entry(*seed).or_default();
-            let before = if is_last { 0 } else { *durable };
+            let before = if deletes_later { 0 } else { *durable };
             *durable = before.max(record.number + 1);
         }
     }

@@ -423,7 +423,7 @@ impl World {
         let mut gathered = None;
         let completed = completion.run(|outcomes| gathered = Some(outcomes));
         self.react(Event::Gathered(gathered.unwrap()));
-        self.within(40, Occurrence::Completed(completed.unwrap()));
+        self.within(40, Occurrence::Completed(completed));
     }
 
     fn react(&mut self, event: Event) {

@@ -16,7 +16,7 @@ use crate::vector::Vector;
 
 /// Number of slownesses in the table.
 const POINTS: usize = 2 * LANES;
-/// Distance of the table's slownesses, in units of √(ρ / stiffness).
+/// Distance of the table's slownesses, in their unit.
 const STEP: f64 = 0.25;
 /// Number of squarings: the norm of the 32nd power bounds the spectral radius to 6 %.
 const SQUARINGS: usize = 5;
@@ -24,15 +24,15 @@ const SQUARINGS: usize = 5;
 /// The table of one solid.
 #[derive(Debug)]
 pub(crate) struct Growth {
-    /// √(ρ / stiffness), s/m.
-    slowness: f64,
-    /// |λ| divided by |s| √(ρ / stiffness), at slownesses 0, STEP, 2 STEP, …
+    /// √(ρ / stiffness), s/m, the unit of slownesses here.
+    slowness_unit: f64,
+    /// |λ| divided by |s| and that unit, at slownesses 0, STEP, 2 STEP, … of it.
     table: [f64; POINTS],
 }
 
 impl Default for Growth {
     fn default() -> Self {
-        Self { slowness: 0.0, table: [0.0; POINTS] }
+        Self { slowness_unit: 0.0, table: [0.0; POINTS] }
     }
 }
 
@@ -40,7 +40,7 @@ impl Growth {
     /// Computes the table of one solid.
     #[inline(always)]
     pub(crate) fn fill<V: Vector>(&mut self, medium: &Medium) {
-        self.slowness = (medium.density / medium.stiffness).sqrt();
+        self.slowness_unit = (medium.density / medium.stiffness).sqrt();
         for block in 0..POINTS / LANES {
             let mut slownesses = Lanes::ZERO;
             for lane in 0..LANES {
@@ -57,15 +57,20 @@ impl Growth {
         }
     }
 
-    /// Returns an upper estimate of |λ|, rad/m, at wavenumbers from `k_min` to `k_max` (rad/m) and
-    /// complex frequency of modulus `s_modulus` (1/s).
+    /// Returns an estimate of the largest |λ|, rad/m, at wavenumbers from `k_min` to `k_max` (rad/m) and
+    /// complex frequency of modulus `s_modulus` (1/s): the larger one of those at both ends.
+    ///
+    /// In an isotropic solid it is largest there, as |λ| falls with the slowness and then rises. In an
+    /// anisotropic one it may be larger between them: over any interval by less than 1 % in bones of
+    /// dispersion 0.1, 25 % at 0.3, and 50 % at 0.7.
     #[inline(always)]
     pub(crate) fn at(&self, k_min: f64, k_max: f64, s_modulus: f64) -> f64 {
-        let unit = self.slowness * s_modulus;
+        let unit = self.slowness_unit * s_modulus;
         unit * self.relative(k_min / unit).max(self.relative(k_max / unit))
     }
 
-    /// Interpolates linearly; beyond the table it grows in proportion to the slowness.
+    /// Returns |λ| in its unit at a slowness in its: between the table's linearly, beyond them in proportion
+    /// to the slowness.
     #[inline(always)]
     fn relative(&self, slowness: f64) -> f64 {
         let position = slowness / STEP;
@@ -79,8 +84,7 @@ impl Growth {
     }
 }
 
-/// Returns an upper bound of the spectral radius of N at slownesses `p`, in units of density and
-/// stiffness.
+/// Returns an upper bound of |λ| at slownesses `p`, both in the units of the table.
 #[inline(always)]
 fn spectral_radius<V: Vector>(medium: &Medium, p: V) -> V {
     let mut power = [[V::splat(0.0); 6]; 6];
@@ -124,4 +128,44 @@ fn spectral_radius<V: Vector>(medium: &Medium, p: V) -> V {
         radius = radius.sqrt().mul(norms[step]);
     }
     radius
+}
+
+#[cfg(test)]
+mod tests {
+    use osteon_common::parameters::Point;
+    use osteon_common::realization::Ensemble;
+
+    use super::*;
+    use crate::vector::Scalar;
+
+    /// Returns the most by which |λ| at a slowness of the table exceeds that at two others around it.
+    fn excess_between_ends(table: &[f64]) -> f64 {
+        let mut most = 0.0_f64;
+        for first in 0..table.len() {
+            for last in first + 1..table.len() {
+                let inside = table[first..last].iter().copied().fold(0.0, f64::max);
+                most = most.max(inside / table[first].max(table[last]) - 1.0);
+            }
+        }
+        most
+    }
+
+    /// Limits: those measured with 1000 bones each, 0, 0.0059, 0.21, 0.33 and 0.42, and some more.
+    #[test]
+    fn little_is_larger_than_at_both_ends() {
+        for (dispersion, limit) in
+            [(0.02, 0.0), (0.1029, 0.01), (0.3, 0.25), (0.5, 0.4), (0.7, 0.5)]
+        {
+            let constants = [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, dispersion];
+            let ensemble = Ensemble::new(&Point::of_bone(constants), 1).unwrap();
+            let (mut bones, mut most) = (0, 0.0_f64);
+            for bone in (0..100).filter_map(|index| ensemble.bone(index).ok()) {
+                let mut growth = Growth::default();
+                growth.fill::<Scalar>(&Medium::new(&bone));
+                most = most.max(excess_between_ends(&growth.table));
+                bones += 1;
+            }
+            assert!(bones > 50 && most <= limit, "{dispersion}: {most} of {bones} bones");
+        }
+    }
 }

@@ -99,7 +99,7 @@ impl<'a> BonePasses<'a> {
         let Self { prepared, caches, speed, .. } = *self;
         let doubt = |found: &Estimated| {
             weights::very_large_sampling_error_weight(prepared, found)
-                .max(weights::useless_error_weight(prepared, found))
+                .max(weights::intolerable_error_weight(prepared, found))
                 .max(weights::unreliable_pick_weight(prepared, found, speed))
         };
         let weight = found.as_ref().map_or(1.0, doubt);

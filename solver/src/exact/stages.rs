@@ -41,7 +41,7 @@ pub struct StageWorkspace {
 
 /// A bone whose tensor has been converted into the common part of its plate's admittances.
 #[derive(Debug)]
-pub struct Filled<'a> {
+pub struct PlateStage<'a> {
     prepared: &'a PreparedSetup,
     bin: TablesRef<'a>,
     accurate: bool,
@@ -52,15 +52,15 @@ pub struct Filled<'a> {
 
 /// A plate whose responses at every frequency and wavenumber are known.
 #[derive(Debug)]
-pub struct Responded<'a, 'b>(&'a mut Filled<'b>);
+pub struct ResponseStage<'a, 'b>(&'a mut PlateStage<'b>);
 
 /// A plate whose spectra at every receiver are known.
 #[derive(Debug)]
-pub struct Summed<'a, 'b>(&'a mut Filled<'b>);
+pub struct SpectraStage<'a, 'b>(&'a mut PlateStage<'b>);
 
 /// A plate whose extrema at every receiver are known.
 #[derive(Debug)]
-pub struct Observed<'a, 'b>(&'a mut Filled<'b>);
+pub struct ExtremaStage<'a, 'b>(&'a mut PlateStage<'b>);
 
 impl Stages {
     /// Creates the stages for cases of `setup`, which has passed validation, on one instruction
@@ -79,7 +79,7 @@ impl Stages {
         &'a self,
         bone: impl Into<BoneRef<'a>>,
         memory: &'a mut StageWorkspace,
-    ) -> Result<Filled<'a>, Failure> {
+    ) -> Result<PlateStage<'a>, Failure> {
         let Self { prepared, caches } = self;
         let accurate = sampling::first_grade(&prepared.setup) == Grade::Thorough;
         let (media, speed) = prepared.media(bone.into())?;
@@ -91,11 +91,11 @@ impl Stages {
         let cache = if accurate { &caches.thorough } else { &caches.quick };
         let index = sampling::speed_bin(&prepared.setup, speed).unwrap_or(SPEED_BINS);
         let bin = cache.tables(index, speed)?;
-        Ok(Filled { prepared, bin, accurate, media, speed, memory })
+        Ok(PlateStage { prepared, bin, accurate, media, speed, memory })
     }
 }
 
-impl<'b> Filled<'b> {
+impl<'b> PlateStage<'b> {
     fn band(&self) -> &Band {
         &self.bin.first
     }
@@ -106,7 +106,7 @@ impl<'b> Filled<'b> {
     }
 
     /// Admittance: computes the plate's response at every pair.
-    pub fn admittance<'a>(&'a mut self) -> Responded<'a, 'b> {
+    pub fn admittance<'a>(&'a mut self) -> ResponseStage<'a, 'b> {
         let (isa, tables, media) = (self.prepared.isa, &self.bin.tables, &self.media);
         let lines = &tables.lines[..self.band().lines];
         let StageWorkspace { exact: ExactWorkspace { fast, accurate, .. }, responses } =
@@ -119,41 +119,41 @@ impl<'b> Filled<'b> {
                 respond(isa, tables, media, fast, line, responses);
             }
         }
-        Responded(self)
+        ResponseStage(self)
     }
 }
 
-impl<'b> Responded<'_, 'b> {
+impl<'b> ResponseStage<'_, 'b> {
     /// Wavenumber sum: computes the spectra at every receiver.
-    pub fn sum(&mut self) -> Summed<'_, 'b> {
-        let Filled { prepared, bin, memory, .. } = &mut *self.0;
+    pub fn sum(&mut self) -> SpectraStage<'_, 'b> {
+        let PlateStage { prepared, bin, memory, .. } = &mut *self.0;
         memory.exact.spectra.clear(&bin.tables);
         for (i, responses) in memory.responses.iter().enumerate() {
             memory.exact.spectra.sum(prepared.isa, &bin.tables, i, responses);
         }
-        Summed(self.0)
+        SpectraStage(self.0)
     }
 }
 
-impl<'b> Summed<'_, 'b> {
+impl<'b> SpectraStage<'_, 'b> {
     /// Time synthesis: computes the extrema of the pressure at every receiver.
     ///
     /// # Errors
     /// If a number is not finite.
-    pub fn synthesis(&mut self) -> Result<Observed<'_, 'b>, Failure> {
-        let Filled { prepared, bin, speed, memory, .. } = &mut *self.0;
+    pub fn synthesis(&mut self) -> Result<ExtremaStage<'_, 'b>, Failure> {
+        let PlateStage { prepared, bin, speed, memory, .. } = &mut *self.0;
         pass::observe(prepared, *speed, bin, &bin.first, &mut memory.exact)?;
-        Ok(Observed(self.0))
+        Ok(ExtremaStage(self.0))
     }
 }
 
-impl Observed<'_, '_> {
+impl ExtremaStage<'_, '_> {
     /// Picking: returns the first arrival and the estimate of its error.
     ///
     /// # Errors
     /// If there is no acceptable pick.
     pub fn picking(&self) -> Result<Arrival, Failure> {
-        let Filled { prepared, bin, memory, .. } = &*self.0;
+        let PlateStage { prepared, bin, memory, .. } = &*self.0;
         let band = self.0.band();
         let found = pass::pick_with_error(prepared, bin, band, &memory.exact)?;
         Ok(found.arrival(1, band.sampled.pairs, 1.0))
@@ -182,10 +182,10 @@ mod tests {
             for i in 0..20 {
                 let bone = ensemble.bone(i).unwrap();
                 let expected = solver.arrival(&bone, &mut workspace).unwrap();
-                let mut filled = stages.tensor(&bone, &mut memory).unwrap();
-                let mut responded = filled.admittance();
-                let mut summed = responded.sum();
-                let arrival = summed.synthesis().unwrap().picking().unwrap();
+                let mut plate = stages.tensor(&bone, &mut memory).unwrap();
+                let mut response = plate.admittance();
+                let mut spectra = response.sum();
+                let arrival = spectra.synthesis().unwrap().picking().unwrap();
                 same += usize::from(arrival == expected);
                 // If the solver makes further passes, it finds nearly the same.
                 assert!((arrival.velocity / expected.velocity - 1.0).abs() < 3e-4, "index {i}");

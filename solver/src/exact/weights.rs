@@ -7,15 +7,17 @@ use crate::exact::pass::slow_decay_factor;
 use crate::exact::prepared_setup::PreparedSetup;
 use crate::picking::Pick;
 
-/// Stated errors at refinement 1 between which the weight of further passes rises from 0 to 1: by the
-/// band's error that of the next wider band, by the sampling's error that of the next grade.
+/// Stated errors at refinement 1 between which the weight of further passes rises from 0 to 1. The whole
+/// error decides about the plain grade and about wider bands of quick and plain passes; of a bone that
+/// begins with the thorough grade, the band's error about wider bands, and the sampling's error about the
+/// full grade.
 pub(super) const LARGE_ERROR: (f64, f64) = (2.1e-4, 2.9e-4);
-/// The same for the thorough and the full grade, by the sampling's error; and for the plain grade if
-/// its widest band is no wider than the quick one.
+/// The same for the thorough and the full grade after quick and plain passes, by the sampling's error;
+/// and for the plain grade, by the whole error, if its widest band is no wider than the quick one.
 pub(super) const VERY_LARGE_ERROR: (f64, f64) = (2.3e-4, 3.4e-4);
-/// Stated errors between which the weight of the thorough passes rises even if the band causes the
-/// error: a short array needs times that are more accurate than usual.
-const USELESS_ERROR: (f64, f64) = (5e-4, 8e-4);
+/// Whole errors between which the weight of the thorough passes rises even if the band causes the error,
+/// and all bands were tried: a short array needs times that are more accurate than usual.
+const INTOLERABLE_ERROR: (f64, f64) = (5e-4, 8e-4);
 /// Ratios of a pick to the largest wave in its window between which the weight of the plain passes
 /// falls, for an array of [`USUAL_ARRAY`]: thinning, and leaving out slow waves, cause errors of up to
 /// some 1e-5 of that wave.
@@ -29,7 +31,7 @@ const USUAL_ARRAY: f64 = 2.5;
 const LATE: (f64, f64) = (1.2, 1.3);
 /// Times from a pick to the direct wave, in periods, between which that weight falls.
 const NEAR_DIRECT_WAVE: (f64, f64) = (0.02, 0.05);
-/// Ratios of the picked extremum to the threshold between which that weight falls.
+/// Ratios of the packet's first extremum, picked or not, to the threshold between which that weight falls.
 const WEAK: (f64, f64) = (1.05, 1.1);
 /// Ratios of a skipped extremum to the threshold between which that weight rises.
 const NEARLY_PICKED: (f64, f64) = (0.9, 0.95);
@@ -45,12 +47,13 @@ pub(super) fn comparable_error(prepared: &PreparedSetup, error: f64) -> f64 {
     error * libm::pow(refinement, power) / slow_decay_factor(&prepared.setup).sqrt()
 }
 
-/// Returns the weight of a finer sampling, which rises with the sampling's error.
+/// Returns the weight of the full grade after a thorough one with which a bone began, which rises with the
+/// sampling's error; and what takes weight from a wider band of the plain grade, which would not help.
 pub(super) fn large_sampling_error_weight(prepared: &PreparedSetup, found: &Estimated) -> f64 {
     rise(comparable_error(prepared, found.sampling_error), LARGE_ERROR)
 }
 
-/// Returns the weight of a wider band, which rises with the whole error.
+/// Returns the weight of a wider band of the quick or the plain grade, which rises with the whole error.
 pub(super) fn large_error_weight(prepared: &PreparedSetup, found: &Estimated) -> f64 {
     rise(comparable_error(prepared, found.error()), LARGE_ERROR)
 }
@@ -70,8 +73,8 @@ pub(super) fn very_large_sampling_error_weight(prepared: &PreparedSetup, found: 
 }
 
 /// Returns the weight of the thorough passes if the whole error is large although all bands were tried.
-pub(super) fn useless_error_weight(prepared: &PreparedSetup, found: &Estimated) -> f64 {
-    rise(comparable_error(prepared, found.error()), USELESS_ERROR)
+pub(super) fn intolerable_error_weight(prepared: &PreparedSetup, found: &Estimated) -> f64 {
+    rise(comparable_error(prepared, found.error()), INTOLERABLE_ERROR)
 }
 
 /// Returns the weight of the plain passes, with less thinning, which rises as the pick becomes small

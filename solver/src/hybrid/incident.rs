@@ -25,7 +25,8 @@ use crate::pulse::Pulse;
 const PULSE_PERIODS: f64 = 3.4;
 /// Points of interpolation between samples.
 const POINTS: usize = 6;
-/// Maximum number of images of the source.
+/// Maximum number of images of the source. A fluid thinner than about 1/64 of the longest path on which a
+/// wave is heard would have more: the waves of those left out are the ones that arrive last.
 const IMAGES_MAX: usize = 64;
 
 /// An image of the source: its height above the bone's face, m, and its sign.

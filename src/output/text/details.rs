@@ -1,4 +1,5 @@
-//! How a result was computed: what decides its bits, and the derivatives behind its intervals.
+//! How a result was computed: the settings and the program that decide its bits, and the sensitivities
+//! behind its intervals.
 
 use osteon_files::report::{Identification, Moment, ResultFile};
 
@@ -10,59 +11,50 @@ use super::result::readable;
 pub(super) fn text(result: &ResultFile) -> String {
     let mut text = String::from("\n");
     if let ResultFile::Identification(found) = result {
-        text.push_str(&slopes(found));
+        text.push_str(&sensitivities(found));
     }
-    text.push_str(&aligned(&origin(result)));
+    text.push_str(&aligned(&settings_and_program(result)));
     text
 }
 
-/// Returns what decides the bits of the result.
-fn origin(result: &ResultFile) -> Vec<[String; 2]> {
+/// Returns a row for each setting that decides the bits of the result, and one for the program.
+fn settings_and_program(result: &ResultFile) -> Vec<[String; 2]> {
     let row = |name: &str, value: String| [name.to_owned(), value];
-    let (mut rows, seed, sampling, scrambles, control_variate, version, numerics) = match result {
+    let (mut rows, sampling, scrambles, control_variate) = match result {
         ResultFile::Identification(found) => {
             let rows = vec![
                 row("search", found.search.method.name().to_owned()),
                 row("objective", found.objective.name().to_owned()),
             ];
-            let Identification { seed, sampling, scrambles, control_variate, .. } = &**found;
-            (rows, seed, sampling, scrambles, control_variate, &found.version, found.numerics)
+            (rows, found.sampling, found.scrambles, found.control_variate)
         }
-        ResultFile::Propagation(found) => (
-            Vec::new(),
-            &found.seed,
-            &found.sampling,
-            &found.scrambles,
-            &found.control_variate,
-            &found.version,
-            found.numerics,
-        ),
+        ResultFile::Propagation(found) => {
+            (Vec::new(), found.sampling, found.scrambles, found.control_variate)
+        }
     };
-    let scrambled = if *scrambles > 1 { format!(", {scrambles} scrambles") } else { String::new() };
-    let controlled = if *control_variate { ", control variate" } else { "" };
+    let scrambled = if scrambles > 1 { format!(", {scrambles} scrambles") } else { String::new() };
+    let controlled = if control_variate { ", control variate" } else { "" };
     rows.push(row("sampling", format!("{}{scrambled}{controlled}", sampling.name())));
-    rows.push(row("seed", seed.to_string()));
-    rows.push(row("computed by", format!("osteon {version}, numerics {numerics}")));
+    rows.push(row("seed", result.seed().to_string()));
+    let program = result.program();
+    let program = format!("osteon {}, numerics {}", program.version, program.numerics);
+    rows.push(row("computed by", program));
     rows
 }
 
-/// Returns the relative changes of the moments for a relative change of each free parameter.
-fn slopes(found: &Identification) -> String {
-    let Some(slopes) = found.sensitivities().filter(|slopes| !slopes.is_empty()) else {
+/// Returns the table of the sensitivities: by how much each moment changes with each free parameter.
+fn sensitivities(found: &Identification) -> String {
+    let Some(parameters) = found.sensitivities().filter(|found| !found.is_empty()) else {
         return String::new();
     };
     let header = ["if a parameter grows by 1 %", "mean velocity", "coefficient of variation"];
     let mut rows = vec![header.map(str::to_owned)];
-    for (parameter, of) in slopes {
-        let change = |moment: Moment| {
-            let slope = of.moments.get(moment);
+    for (parameter, sensitivity) in parameters {
+        let cell = |moment: Moment| {
+            let slope = sensitivity.moments.get(moment);
             slope.map_or("unknown".to_owned(), |slope| format!("{} %", digits(slope, 3)))
         };
-        rows.push([
-            readable(*parameter),
-            change(Moment::Mean),
-            change(Moment::CoefficientOfVariation),
-        ]);
+        rows.push([readable(*parameter), cell(Moment::Mean), cell(Moment::CoefficientOfVariation)]);
     }
     format!("{}\n", aligned(&rows))
 }

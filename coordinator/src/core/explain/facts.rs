@@ -115,7 +115,7 @@ impl JobFacts {
         facts.realizations = specification.monte_carlo.realizations;
         facts.parts_left = job.search.parts().saturating_sub(job.search.part()).max(1);
         facts.refusal = job.store_retry.as_ref().map(|it| (it.error.clone(), since(it.since)));
-        facts.unanswered = since(job.progressed);
+        facts.unanswered = since(job.last_progress);
         facts.rate = job.rate.per_second(now);
         facts.oldest = oldest(state, id, now);
         if let Some(evaluation) = job.evaluation() {

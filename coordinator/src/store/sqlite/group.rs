@@ -2,7 +2,7 @@
 
 use rusqlite::Connection;
 
-use super::SqliteStore;
+use super::{OpenGroup, SqliteStore};
 use crate::core::ids::JobId;
 use crate::store::{Changes, StoreError};
 
@@ -11,13 +11,15 @@ impl SqliteStore {
     pub(super) fn change_together(&self, changes: &mut Changes<'_>) -> Result<(), StoreError> {
         let refused = |source| self.refused(source);
         let transaction = self.connection.unchecked_transaction().map_err(refused)?;
-        self.group.set(Some(JobId(0)));
+        self.group.set(Some(OpenGroup::default()));
         let mut store = self;
         let changed = changes(&mut store);
-        let accepted = self.group.take();
+        let accepted = self.group.take().and_then(|group| group.highest_job);
         // An error rolls the transaction back, if SQLite has not done so already.
         changed?;
         transaction.commit().map_err(refused)?;
+        // If this fails, the caller puts each record again by itself, and a job that then fails again is
+        // removed by `accept`.
         accepted.map_or(Ok(()), |job| self.mark.borrow_mut().acknowledge(job))
     }
 
@@ -39,8 +41,9 @@ impl SqliteStore {
 
     /// Handles a job whose row is written: it counts as acknowledged once the row is durable.
     pub(super) fn accept(&self, job: JobId) -> Result<(), StoreError> {
-        if let Some(highest) = self.group.get() {
-            self.group.set(Some(highest.max(job)));
+        if let Some(OpenGroup { highest_job }) = self.group.get() {
+            // `None` is less than any job.
+            self.group.set(Some(OpenGroup { highest_job: highest_job.max(Some(job)) }));
             return Ok(());
         }
         self.mark.borrow_mut().acknowledge(job).inspect_err(|_| {

@@ -52,9 +52,9 @@ impl Store for SqliteStore {
     fn put_evaluation(
         &mut self,
         record: &EvaluationRecord,
-        is_last: bool,
+        deletes_later: bool,
     ) -> Result<(), StoreError> {
-        (&*self).put_evaluation(record, is_last)
+        (&*self).put_evaluation(record, deletes_later)
     }
 
     fn put_evaluations(&mut self, records: &[EvaluationRecord]) -> Result<(), StoreError> {

@@ -1,4 +1,4 @@
-//! The table of summaries.
+//! The table `summary`: of each ended job, the summary of the path of its search.
 
 use osteon_common::results::{Evaluation, GroupEnding};
 use osteon_proto::{history, v1};
@@ -9,7 +9,7 @@ use rusqlite::{Connection, OptionalExtension as _, params};
 use super::columns::checksum;
 use crate::core::ids::JobId;
 
-/// Writes a summary.
+/// Writes the summary of a job.
 pub(super) fn put(connection: &Connection, job: JobId, summary: &Summary) -> rusqlite::Result<()> {
     let rows = summary.history.iter().map(history::evaluation_to_message).collect();
     let groups = summary.groups.iter().map(history::group_ending_to_message).collect();
@@ -36,6 +36,7 @@ pub(super) fn get(
     connection.query_row(sql, params![job.0], read).optional()
 }
 
+/// Returns the rows and the endings of groups in a `HistoryBlock`; `None` if it is none, or not a valid one.
 fn block(encoded: &[u8]) -> Option<(Vec<Evaluation>, Vec<GroupEnding>)> {
     let block = v1::HistoryBlock::decode(encoded).ok()?;
     let rows = block.rows.iter().map(|row| history::evaluation_from_message(row).ok());
@@ -43,6 +44,7 @@ fn block(encoded: &[u8]) -> Option<(Vec<Evaluation>, Vec<GroupEnding>)> {
     Some((rows.collect::<Option<_>>()?, groups.collect::<Option<_>>()?))
 }
 
+/// Returns the checksum of a row of the table.
 pub(super) fn summary_checksum(
     job: JobId,
     digest: &str,

@@ -3,10 +3,10 @@
 use super::{departures, proofs};
 use crate::core::ahead::Ahead;
 use crate::core::batch::{Assignment, Batch, Purpose};
+use crate::core::bounded_duration::bounded_duration;
 use crate::core::crashes::{Cause, LostWorker};
 use crate::core::effect::Effect;
 use crate::core::evaluation::Audit;
-use crate::core::fairness;
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::Speculation;
 use crate::core::policy::{AUDIT_LOSSES_MAX, BATCHES_IN_FLIGHT_MAX};
@@ -49,7 +49,7 @@ pub(crate) fn charge(state: &mut State, id: BatchId) {
     };
     let count = batch.assignment.indices.count as f64;
     let seconds = worker.rates.get(&batch.assignment.job).map_or(target, |rate| count / rate);
-    batch.charged = fairness::slot_time(seconds, worker.hello.slots);
+    batch.charged = bounded_duration(seconds * f64::from(worker.hello.slots));
     state.shares.charge(&job.record.client, batch.charged);
 }
 

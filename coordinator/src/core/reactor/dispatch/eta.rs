@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::core::batch::{Batch, Purpose};
-use crate::core::fairness;
+use crate::core::bounded_duration::bounded_duration;
 use crate::core::ids::JobId;
 use crate::core::state::State;
 
@@ -40,6 +40,6 @@ pub(crate) fn expected_time(state: &State, batch: &Batch) -> Duration {
     let rates = state.workers.get(&batch.worker).map(|worker| &worker.rates);
     let rate = rates.and_then(|rates| rates.get(&batch.assignment.job));
     rate.map_or(Duration::ZERO, |rate| {
-        fairness::slot_time(batch.assignment.indices.count as f64 / rate, 1)
+        bounded_duration(batch.assignment.indices.count as f64 / rate)
     })
 }

@@ -13,8 +13,8 @@ use osteon_common::parameters::Point;
 
 use super::{batches, eta, sizing};
 use crate::core::batch::{Assignment, Batch, Purpose};
+use crate::core::bounded_duration::bounded_duration;
 use crate::core::evaluation::PendingEvaluation;
-use crate::core::fairness;
 use crate::core::ids::{JobId, WorkerId};
 use crate::core::indices::Indices;
 use crate::core::job::{Job, Stage};
@@ -113,7 +113,7 @@ fn must_stay_idle(
     // So many realizations begin at once, and none of them is interrupted.
     let begun = spare.min(queued_realizations(job, point)) as f64;
     let seconds = attached.rates.get(&id).map_or(0.0, |rate| begun / rate);
-    let takes = fairness::slot_time(seconds, 1);
+    let takes = bounded_duration(seconds);
     let is_soon = |eta: &Duration| now < *eta + takes / 2 && *eta < now + takes / 2;
     etas.get(&id).is_some_and(is_soon)
         || slots < spare + slots_wanted_by_others(state, id, now + takes, etas)

@@ -14,9 +14,9 @@ use std::time::Duration;
 use super::poison::{self, Reputation};
 use super::{batches, duplicates, schedule};
 use crate::core::batch::{Assignment, Batch, Purpose};
+use crate::core::bounded_duration::bounded_duration;
 use crate::core::crashes::Crashes;
 use crate::core::dispute::Dispute;
-use crate::core::fairness;
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::policy::{
     DUPLICATES_MAX, MISSED_MAX, OVERDUE_AT_ONCE_MAX, OVERDUE_FACTOR, OVERDUE_MIN, SILENT_MAX,
@@ -67,15 +67,16 @@ pub(crate) fn is_waited_for(state: &State, id: BatchId, now: Duration) -> bool {
 }
 
 /// Returns the expected time of a batch, together with those that its worker was sent before it, by
-/// the rate of the worker or the pace of the job, whichever is slower; `None` if the pace of the
-/// job is unknown.
+/// the rate of the worker or the job's time of a realization, whichever is slower; `None` if both are
+/// unknown.
 fn expected_time(state: &State, id: BatchId) -> Option<Duration> {
     let worker = state.workers.get(&state.batches.get(&id)?.worker)?;
     let own_time = |id: &BatchId| {
         let Assignment { job, indices, .. } = state.batches.get(id)?.assignment;
-        let pace = state.jobs.get(&job)?.pace.expected_time(indices.count, worker.hello.slots);
+        let realization_time = state.jobs.get(&job)?.realization_time;
+        let expected = realization_time.expected_time(indices.count, worker.hello.slots);
         let rate = worker.rates.get(&job);
-        pace.max(rate.map(|rate| fairness::slot_time(indices.count as f64 / rate, 1)))
+        expected.max(rate.map(|rate| bounded_duration(indices.count as f64 / rate)))
     };
     let before = worker.in_flight.iter().filter(|held| **held < id);
     let before: Duration = before.filter_map(own_time).sum();

@@ -9,8 +9,8 @@ use osteon_proto::malformed::Malformed;
 
 use super::checks;
 use crate::core::batch::{Assignment, Batch, Purpose};
+use crate::core::bounded_duration::bounded_duration;
 use crate::core::close_reason::CloseReason;
-use crate::core::fairness;
 use crate::core::ids::{BatchId, WorkerId};
 use crate::core::job::Job;
 use crate::core::policy::{ELAPSED_MIN_S, RATE_WEIGHT};
@@ -164,7 +164,7 @@ fn learn_pace(state: &mut State, assignment: &Assignment, worker: WorkerId, elap
         && elapsed_s.is_finite()
         && elapsed_s >= ELAPSED_MIN_S
     {
-        job.pace.learn(assignment.indices.count, slots, elapsed_s);
+        job.realization_time.learn(assignment.indices.count, slots, elapsed_s);
     }
 }
 
@@ -193,12 +193,12 @@ fn fill(
         |job: &&mut Job| job.certain_evaluations().any(|it| it.attempt == assignment.attempt);
     if let Some(job) = state.jobs.get_mut(&assignment.job).filter(asked_for) {
         job.rate.add(news, now);
-        job.progressed = now;
+        job.last_progress = now;
     }
     state.changed.insert(assignment.job);
 }
 
-/// Updates the rate of a worker, the pace of its job and the delay of answers with one that arrives `now`;
+/// Updates the rate of a worker, the time of a realization of its job and the delay of answers with one that arrives `now`;
 /// `before` is the time of the worker's answer before it.
 fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, (before, now): (Duration, Duration)) {
     let plausible = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
@@ -217,11 +217,11 @@ fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, (before, now): (Dur
     let count = batch.assignment.indices.count;
     let seconds = count as f64 / rate;
     let slots = worker.hello.slots;
-    let took = fairness::slot_time(seconds, slots);
+    let took = bounded_duration(seconds * f64::from(slots));
     if let Some(job) = state.jobs.get_mut(&batch.assignment.job) {
         job.rated_workers += u64::from(is_first);
         // A worker cannot have computed for longer than the time since the batch was sent.
-        job.pace.learn(count, slots, seconds.min(waited_s));
+        job.realization_time.learn(count, slots, seconds.min(waited_s));
     }
     if let Some(job) =
         state.jobs.get(&batch.assignment.job).filter(|_| batch.purpose != Purpose::Speculative)

@@ -126,7 +126,7 @@ pub(crate) fn take_proof(
         return;
     };
     let count = proofs.indices().count;
-    proofs.give(by);
+    proofs.give(by, turn.now);
     let cast = proofs.ballot.cast(Vote { by: by.clone(), solved });
     turn.state.count_checked(by, count);
     match cast {

@@ -46,14 +46,14 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     let (number, point) = (evaluation.number, evaluation.point);
     // Only an evaluation that was stored before, with the same outcomes, leaves those after it
     // valid.
-    let is_last = evaluation.diverges_from_store(&outcomes);
+    let deletes_later = evaluation.diverges_from_store(&outcomes);
     let workers = std::mem::take(&mut evaluation.workers).into_iter().collect();
     let record = EvaluationRecord { job: id, number, point, outcomes, estimated_error, workers };
     ahead::keep_if_awaited(job, &record);
-    turn.effects.push(Effect::Store(Record::Evaluation { record: record.clone(), is_last }));
+    turn.effects.push(Effect::Store(Record::Evaluation { record: record.clone(), deletes_later }));
     let outcomes = record.outcomes.clone();
-    job.stage = Stage::StoringEvaluation { record, is_last };
-    if is_last {
+    job.stage = Stage::StoringEvaluation { record, deletes_later };
+    if deletes_later {
         speculation::prepare(turn, id, &outcomes);
     }
     ahead::refresh(turn, id);
@@ -82,7 +82,7 @@ fn complete_aside(turn: &mut Turn, id: JobId) {
 
 /// Stores an evaluation while its search takes it in, beside the core.
 pub(crate) fn store_gathered(turn: &mut Turn, gathered: Gathered) {
-    let Gathered { job: id, attempt, record, is_last } = gathered;
+    let Gathered { job: id, attempt, record, deletes_later } = gathered;
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
@@ -91,11 +91,11 @@ pub(crate) fn store_gathered(turn: &mut Turn, gathered: Gathered) {
         return;
     }
     ahead::keep_if_awaited(job, &record);
-    job.progressed = turn.now;
+    job.last_progress = turn.now;
     let records = vec![record];
-    turn.effects.push(Effect::Store(Record::of_evaluations(records.clone(), is_last)));
+    turn.effects.push(Effect::Store(Record::of_evaluations(records.clone(), deletes_later)));
     let after = After::Awaited { attempt, durable: false };
-    job.stage = Stage::StoringPrepared { records, is_last, after };
+    job.stage = Stage::StoringPrepared { records, deletes_later, after };
     ahead::refresh(turn, id);
 }
 
@@ -184,7 +184,7 @@ fn next_waiting(state: &State) -> Option<JobId> {
 fn begin(turn: &mut Turn, id: JobId) {
     turn.state.waiting.retain(|waiting| *waiting != id);
     if let Some(job) = turn.state.jobs.get_mut(&id) {
-        job.progressed = turn.now;
+        job.last_progress = turn.now;
         turn.state.shares.begin(&job.record.client);
         turn.state.active.insert(id);
         turn.effects.push(Effect::Note(Notice::JobStarted { job: id, stored: job.stored }));
@@ -262,9 +262,9 @@ fn store_prepared(turn: &mut Turn, id: JobId) -> bool {
         });
     }
     turn.effects.push(Effect::Store(Record::of_evaluations(records.clone(), true)));
-    job.progressed = turn.now;
+    job.last_progress = turn.now;
     let after = After::Ready(after);
-    job.stage = Stage::StoringPrepared { records, is_last: true, after };
+    job.stage = Stage::StoringPrepared { records, deletes_later: true, after };
     // Its candidates were those of another point.
     speculation::drop_all(turn, id);
     ahead::refresh(turn, id);

@@ -33,21 +33,22 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
                 jobs::begin_waiting(turn);
             }
         }
-        (RecordKey::Evaluation(number), Stage::StoringEvaluation { record, is_last })
+        (RecordKey::Evaluation(number), Stage::StoringEvaluation { record, deletes_later })
             if record.number == number =>
         {
             let (outcomes, estimated_error) = (record.outcomes.clone(), record.estimated_error);
-            job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
+            job.stored = if *deletes_later { number + 1 } else { job.stored.max(number + 1) };
             job.received = job.recomputed.then(|| record.clone());
             job.workers.append(&mut record.workers);
             job.store_retry = None;
             job.search.tell(outcomes, estimated_error);
             go_on(turn, id);
         }
-        (RecordKey::Evaluation(number), Stage::StoringPrepared { records, is_last, after })
-            if records.last().is_some_and(|last| last.number == number) =>
-        {
-            job.stored = if *is_last { number + 1 } else { job.stored.max(number + 1) };
+        (
+            RecordKey::Evaluation(number),
+            Stage::StoringPrepared { records, deletes_later, after },
+        ) if records.last().is_some_and(|last| last.number == number) => {
+            job.stored = if *deletes_later { number + 1 } else { job.stored.max(number + 1) };
             job.received = records.last().filter(|_| job.recomputed).cloned();
             let workers = records.iter_mut().map(|record| std::mem::take(&mut record.workers));
             job.workers.extend(workers.flatten());
@@ -81,7 +82,7 @@ pub(crate) fn on_record_stored(turn: &mut Turn, id: JobId, key: RecordKey) {
 /// Takes over the search that was told of an evaluation beside the core; the job continues if the
 /// evaluation is durable.
 pub(crate) fn on_completed(turn: &mut Turn, completed: Completed) {
-    let Completed { job: id, attempt, after: told } = completed;
+    let Completed { job: id, attempt, search } = completed;
     let Some(job) = turn.state.jobs.get_mut(&id) else {
         return;
     };
@@ -91,10 +92,10 @@ pub(crate) fn on_completed(turn: &mut Turn, completed: Completed) {
     match after {
         After::Awaited { attempt: awaited, durable } if *awaited == attempt => {
             if *durable {
-                job.search = *told;
+                job.search = *search;
                 jobs::advance(turn, id);
             } else {
-                *after = After::Ready(told);
+                *after = After::Ready(search);
             }
         }
         // It was begun again meanwhile.
@@ -174,12 +175,12 @@ pub(crate) fn report_store_failure_if_persistent(turn: &mut Turn, since: Duratio
 /// evaluation that it is reading.
 pub(crate) fn store_again(job: &mut Job, effects: &mut Vec<Effect>) {
     effects.push(match &job.stage {
-        Stage::StoringEvaluation { record, is_last } => {
+        Stage::StoringEvaluation { record, deletes_later } => {
             let record = record.clone();
-            Effect::Store(Record::Evaluation { record, is_last: *is_last })
+            Effect::Store(Record::Evaluation { record, deletes_later: *deletes_later })
         }
-        Stage::StoringPrepared { records, is_last, .. } => {
-            Effect::Store(Record::of_evaluations(records.clone(), *is_last))
+        Stage::StoringPrepared { records, deletes_later, .. } => {
+            Effect::Store(Record::of_evaluations(records.clone(), *deletes_later))
         }
         Stage::StoringEnd(end) => {
             let summary = Arc::new(job.search.summary());

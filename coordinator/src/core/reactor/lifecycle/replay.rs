@@ -61,7 +61,7 @@ fn recompute(turn: &mut Turn, id: JobId) {
         return;
     };
     job.store_retry = None;
-    job.progressed = turn.now;
+    job.last_progress = turn.now;
     turn.state.changed.insert(id);
     if job.cancelled {
         jobs::finish(turn, id, jobs::cancelled_ending());
@@ -108,7 +108,7 @@ fn replay(turn: &mut Turn, id: JobId, record: EvaluationRecord) {
         return;
     };
     turn.state.changed.insert(id);
-    job.progressed = turn.now;
+    job.last_progress = turn.now;
     let copy = job.recomputed.then(|| record.clone());
     let EvaluationRecord { number, point, outcomes, estimated_error, workers, .. } = record;
     if job.recomputed && job.search.expects(point).is_err() {
@@ -154,5 +154,5 @@ fn end_path(turn: &mut Turn, id: JobId) {
     let records = vec![last];
     turn.effects.push(Effect::Store(Record::of_evaluations(records.clone(), true)));
     let after = After::Ready(Box::new(job.search.clone()));
-    job.stage = Stage::StoringPrepared { records, is_last: true, after };
+    job.stage = Stage::StoringPrepared { records, deletes_later: true, after };
 }

@@ -23,7 +23,7 @@ fn rig(specification: JobSpecification) -> (Rig, Completion) {
 fn steps(completion: Completion) -> [Event; 2] {
     let mut gathered = None;
     let completed = completion.run(|outcomes| gathered = Some(outcomes));
-    [Event::Gathered(gathered.unwrap()), Event::Completed(completed.unwrap())]
+    [Event::Gathered(gathered.unwrap()), Event::Completed(completed)]
 }
 
 #[test]

@@ -24,7 +24,8 @@ fn rig(processes: &[u32], evaluations: u64) -> (Rig, MemoryStore) {
     for (worker, (number, process)) in (100..).zip(turns) {
         rig.event(hello_of(worker, *process, 1));
         let effects = react(&mut rig.state, answer_in(0.1, worker, number + 1, number, 1), rig.now);
-        let [Effect::Store(Record::Evaluation { record, is_last: true })] = &effects[..] else {
+        let [Effect::Store(Record::Evaluation { record, deletes_later: true })] = &effects[..]
+        else {
             panic!("{effects:?}");
         };
         store.put_evaluation(record, true).unwrap();
@@ -121,7 +122,7 @@ fn a_damaged_evaluation_is_computed_again_and_no_other() {
     read(&mut rig, &store, 0);
     rig.check(read_damaged_event(1), &["send 1: batch 1 = 0+1"]);
     let effects = react(&mut rig.state, answer(1, 1, 1, 1), rig.now);
-    let Effect::Store(Record::Evaluation { record, is_last: false }) = &effects[0] else {
+    let Effect::Store(Record::Evaluation { record, deletes_later: false }) = &effects[0] else {
         panic!("{effects:?}");
     };
     assert_eq!(record.outcomes, store.evaluation(JobId(1), 1).unwrap().unwrap().outcomes);
@@ -148,7 +149,8 @@ fn what_came_of_a_damaged_evaluation_that_was_wrong_is_computed_again() {
     // The rest of the old path is deleted before anything else: the coordinator may be killed now.
     let last = number - 1;
     assert_eq!(effects, [format!("store job 1 evaluation {last}")]);
-    let Stage::StoringPrepared { records, is_last: true, .. } = &rig.state.jobs[&JobId(1)].stage
+    let Stage::StoringPrepared { records, deletes_later: true, .. } =
+        &rig.state.jobs[&JobId(1)].stage
     else {
         panic!("{:?}", rig.state.jobs[&JobId(1)].stage);
     };
@@ -159,7 +161,7 @@ fn what_came_of_a_damaged_evaluation_that_was_wrong_is_computed_again() {
     assert_eq!(rig.state.jobs[&JobId(1)].stored, number);
     let batch = batch_of(&rig, JobId(1));
     let effects = react(&mut rig.state, answer(1, batch, number, 1), rig.now);
-    let Effect::Store(Record::Evaluation { is_last: true, .. }) = &effects[0] else {
+    let Effect::Store(Record::Evaluation { deletes_later: true, .. }) = &effects[0] else {
         panic!("{effects:?}");
     };
 }
@@ -215,7 +217,7 @@ fn the_evaluations_of_a_banned_worker_are_computed_again() {
     // The outcomes are the same: the evaluations stored after it are right, and read.
     let again = answer(60, batch_of(&rig, JobId(1)), 1, 1);
     let effects = react(&mut rig.state, again, rig.now);
-    let Effect::Store(Record::Evaluation { record, is_last: false }) = &effects[0] else {
+    let Effect::Store(Record::Evaluation { record, deletes_later: false }) = &effects[0] else {
         panic!("{effects:?}");
     };
     let name = WorkerName::new("node-3", 3, 0);
@@ -234,7 +236,7 @@ fn an_evaluation_that_changes_is_the_last_of_its_path() {
     rig.event(hello_of(60, 3, 1));
     let different = answer(60, batch_of(&rig, JobId(1)), 77, 1);
     let effects = react(&mut rig.state, different, rig.now);
-    let Effect::Store(Record::Evaluation { record, is_last: true }) = &effects[0] else {
+    let Effect::Store(Record::Evaluation { record, deletes_later: true }) = &effects[0] else {
         panic!("{effects:?}");
     };
     let EvaluationRecord { number: 0, .. } = record else { panic!("{record:?}") };

@@ -175,9 +175,9 @@ fn a_complete_evaluation_leaves_nothing_saved() {
                 let answer = answer(worker.0, batch.0, work.first, work.count.into());
                 sent.extend(react(&mut after.state, answer, after.now));
             }
-            Effect::Store(Record::Evaluation { record, is_last }) => {
+            Effect::Store(Record::Evaluation { record, deletes_later }) => {
                 assert_eq!(record.outcomes, (0..100).map(velocity).collect());
-                store.put_evaluation(&record, is_last).unwrap();
+                store.put_evaluation(&record, deletes_later).unwrap();
             }
             _ => {}
         }

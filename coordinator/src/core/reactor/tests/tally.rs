@@ -154,7 +154,7 @@ fn wanted_slots_are_those_that_are_worth_their_batches() {
         let mut rig = Rig::with(0, &[]);
         let job = rig.accept(identification(realizations));
         if let Some(each_s) = each_s {
-            rig.state.jobs.get_mut(&job).unwrap().pace.learn(1, 1, each_s);
+            rig.state.jobs.get_mut(&job).unwrap().realization_time.learn(1, 1, each_s);
         }
         let measured = StateMeasurements::new(&rig.state, rig.now);
         assert_eq!(measured.slots_wanted, expected, "{realizations} of {each_s:?}");

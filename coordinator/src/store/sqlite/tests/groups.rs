@@ -14,7 +14,7 @@ use crate::store::thread::{StoreCommand, serve};
 fn records() -> Vec<Record> {
     let evaluation = |job, number| {
         let record = evaluation(job, number);
-        Record::Evaluation { record, is_last: number > 0 }
+        Record::Evaluation { record, deletes_later: number > 0 }
     };
     vec![
         evaluation(1, 0),
@@ -272,7 +272,7 @@ fn records_that_wait_are_written_together_in_the_order_of_arrival() {
     let evaluation = |number, realizations| {
         let outcomes = vec![Ok(3900.0); realizations].into();
         let record = EvaluationRecord { outcomes, ..evaluation(1, number) };
-        StoreCommand::Put(Record::Evaluation { record, is_last: false })
+        StoreCommand::Put(Record::Evaluation { record, deletes_later: false })
     };
     let full = GROUP_RECORDS_MAX as u64;
     check_commands(put(3..4).collect(), 1, 1);

@@ -74,8 +74,8 @@ fn a_large_evaluation_is_read_as_it_was_written() {
 fn pieces_go_with_their_evaluation() {
     let (_directory, mut store) = store();
     let pieces = |store: &SqliteStore| rows(store, "SELECT evaluation FROM piece ORDER BY 1");
-    let put = |store: &mut SqliteStore, number, count, is_last| {
-        store.put_evaluation(&large(number, count), is_last).unwrap();
+    let put = |store: &mut SqliteStore, number, count, deletes_later| {
+        store.put_evaluation(&large(number, count), deletes_later).unwrap();
     };
     for number in 0..4 {
         put(&mut store, number, PIECE_OUTCOMES + 1, true);

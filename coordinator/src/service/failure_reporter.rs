@@ -1,4 +1,4 @@
-//! Reports once, to the process that runs a coordinator, that it cannot continue.
+//! Reports the first failure after which a coordinator cannot continue to the process that runs it.
 
 use std::time::Duration;
 
@@ -31,12 +31,14 @@ pub enum ComponentFailure {
     },
 }
 
-const START_AGAIN: &str = "start it again: every job continues from its last stored evaluation";
+/// The program is the coordinator's own, or one that runs a job with a coordinator inside it.
+const START_AGAIN: &str =
+    "start this program again: every job continues from its last stored evaluation";
 
 #[derive(Debug)]
 enum Health {
     Well,
-    /// A shutdown has been requested: the end of a part is no failure from now on.
+    /// The coordinator is being stopped: the end of a part is no failure from now on.
     Stopping,
     Failed(ComponentFailure),
 }
@@ -48,8 +50,9 @@ pub(crate) struct FailureReporter(watch::Sender<Health>);
 /// Held by a part of a coordinator while it runs; reports its end, by panic or otherwise.
 #[derive(Debug)]
 pub(crate) struct Guard {
-    part: ComponentFailure,
-    failing: FailureReporter,
+    /// What the end of this part is reported as.
+    failure: ComponentFailure,
+    reporter: FailureReporter,
 }
 
 impl FailureReporter {
@@ -58,8 +61,8 @@ impl FailureReporter {
     }
 
     /// Reports that the coordinator cannot continue.
-    pub(crate) fn report(&self, failed: ComponentFailure) {
-        self.change_if_well(Health::Failed(failed));
+    pub(crate) fn report(&self, failure: ComponentFailure) {
+        self.change_if_well(Health::Failed(failure));
     }
 
     /// Records that the coordinator is about to be stopped.
@@ -67,8 +70,9 @@ impl FailureReporter {
         self.change_if_well(Health::Stopping);
     }
 
-    pub(crate) fn guard(&self, part: ComponentFailure) -> Guard {
-        Guard { part, failing: self.clone() }
+    /// Returns the guard of a part whose end is reported as `failure`.
+    pub(crate) fn guard(&self, failure: ComponentFailure) -> Guard {
+        Guard { failure, reporter: self.clone() }
     }
 
     /// Returns the first failure; never completes if there is none.
@@ -77,15 +81,16 @@ impl FailureReporter {
         async move {
             let is_failed = |health: &Health| matches!(health, Health::Failed(_));
             if let Ok(known) = health.wait_for(is_failed).await
-                && let Health::Failed(failed) = &*known
+                && let Health::Failed(failure) = &*known
             {
-                return failed.clone();
+                return failure.clone();
             }
             // No sender is left that could report a failure.
             std::future::pending().await
         }
     }
 
+    /// Changes the health, unless a failure or the stop was recorded before.
     fn change_if_well(&self, next: Health) {
         self.0.send_if_modified(|health| {
             // The first failure is the cause of all others.
@@ -100,7 +105,7 @@ impl FailureReporter {
 
 impl Drop for Guard {
     fn drop(&mut self) {
-        self.failing.report(self.part.clone());
+        self.reporter.report(self.failure.clone());
     }
 }
 
@@ -111,9 +116,9 @@ mod tests {
     use super::*;
 
     async fn check(what: impl FnOnce(&FailureReporter), expected: Option<ComponentFailure>) {
-        let failing = FailureReporter::new();
-        let mut first = std::pin::pin!(failing.first());
-        what(&failing);
+        let reporter = FailureReporter::new();
+        let mut first = std::pin::pin!(reporter.first());
+        what(&reporter);
         let told = futures::poll!(&mut first);
         assert_eq!(told, expected.map_or(Poll::Pending, Poll::Ready));
     }
@@ -121,29 +126,32 @@ mod tests {
     #[tokio::test]
     async fn the_first_failure_is_told_and_no_stop() {
         check(|_| {}, None).await;
-        check(|failing| drop(failing.guard(ComponentFailure::Core)), Some(ComponentFailure::Core))
-            .await;
-        let both = |failing: &FailureReporter| {
-            drop(failing.guard(ComponentFailure::Store));
-            drop(failing.guard(ComponentFailure::Core));
+        check(
+            |reporter| drop(reporter.guard(ComponentFailure::Core)),
+            Some(ComponentFailure::Core),
+        )
+        .await;
+        let both = |reporter: &FailureReporter| {
+            drop(reporter.guard(ComponentFailure::Store));
+            drop(reporter.guard(ComponentFailure::Core));
         };
         check(both, Some(ComponentFailure::Store)).await;
-        let stopped = |failing: &FailureReporter| {
-            failing.disarm();
-            drop(failing.guard(ComponentFailure::Core));
+        let stopped = |reporter: &FailureReporter| {
+            reporter.disarm();
+            drop(reporter.guard(ComponentFailure::Core));
         };
         check(stopped, None).await;
     }
 
     #[tokio::test]
     async fn a_panic_is_told() {
-        let failing = FailureReporter::new();
-        let guard = failing.guard(ComponentFailure::Server);
+        let reporter = FailureReporter::new();
+        let guard = reporter.guard(ComponentFailure::Server);
         let panics = async move {
             let _guard = guard;
             panic!("a part of the coordinator that this test breaks");
         };
         assert!(tokio::spawn(panics).await.is_err());
-        assert_eq!(failing.first().await, ComponentFailure::Server);
+        assert_eq!(reporter.first().await, ComponentFailure::Server);
     }
 }
