@@ -18,6 +18,8 @@ use osteon_common::job::{
 use osteon_common::job::{Sampling, SearchMethod};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Parameter;
+use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
+use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
@@ -81,6 +83,19 @@ const DEFAULT_SETUP: Setup = Setup {
         element_size: 0.5e-3,
         element_order: 8,
         time_step: None,
+    },
+    pores: Pores {
+        porosity: None,
+        profile: PorosityProfile {
+            surface: None,
+            marrow: None,
+            shape: ProfileShape::Linear,
+            sublayers: 6,
+        },
+        model: PorosityModel {
+            homogenisation: Homogenisation::MoriTanaka,
+            fluid: PoreFluid { bulk_modulus: 2.3e9, density: 1000.0 },
+        },
     },
 };
 
@@ -247,6 +262,7 @@ fn a_complete_job_means_what_it_says() {
             },
             picking: Picking { extremum: Extremum::Second, threshold: 0.06 },
             solver: SolverSettings { refinement: 1.5, ..SolverSettings::default() },
+            pores: DEFAULT_SETUP.pores,
         }
     );
     // An integer stands for a number.

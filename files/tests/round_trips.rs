@@ -1,6 +1,9 @@
 //! What is written reads back to the same bits; what is read never panics; a specification is
 //! judged alike whether it comes as a file or not.
 
+#[path = "round_trips/random_bones.rs"]
+mod random_bones;
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -8,7 +11,6 @@ use osteon_common::attenuation::Attenuation;
 use osteon_common::bone::{Bone, CaseBone, Sublayer, Sublayers};
 use osteon_common::case::{Case, Setup};
 use osteon_common::data::numbered;
-use osteon_common::elasticity::Elasticity;
 use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, Omitted,
     PosteriorPrior, PosteriorSettings, Prior, PriorDistribution, Range, Sampling, Search,
@@ -19,8 +21,7 @@ use osteon_common::layers::{Fluid, Layers};
 use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::{PARAMETERS, Parameter};
-use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
-use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
+use osteon_common::pores::Pores;
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
@@ -110,49 +111,10 @@ fn setup() -> impl Strategy<Value = Setup> {
     )
 }
 
-/// The pores of a job's bone.
-fn pores() -> impl Strategy<Value = Pores> {
-    let shape = prop::sample::select(ProfileShape::ALL.to_vec());
-    let homogenisation = prop::sample::select(Homogenisation::ALL.to_vec());
-    let porosities = (any::<bool>(), 0.01..0.32, 0.01..0.32);
-    (porosities, shape, 2_u32..=16, homogenisation, 0.0..1e10, 0.0..1600.0).prop_map(
-        |((is_profile, one, other), shape, sublayers, homogenisation, bulk_modulus, density)| {
-            let model =
-                PorosityModel { homogenisation, fluid: PoreFluid { bulk_modulus, density } };
-            let mut pores = Pores { model, ..Pores::default() };
-            if !is_profile {
-                pores.porosity = Some(one);
-                return pores;
-            }
-            let profile =
-                PorosityProfile { surface: Some(one), marrow: Some(other), shape, sublayers };
-            pores.profile = match shape {
-                ProfileShape::Linear => profile,
-                ProfileShape::Endosteal => PorosityProfile { sublayers: 6, ..profile },
-            };
-            pores
-        },
-    )
-}
-
-/// Positive definite, of any size between 1 Pa and 1e12 Pa, with all 36 entries.
-fn elasticity() -> impl Strategy<Value = Elasticity> {
-    let entries = prop::array::uniform32(-1.0..1.0);
-    (entries, 1.0..1e12).prop_filter_map("not positive definite", |(entries, scale)| {
-        let mut rows = [[0.0; 6]; 6];
-        for i in 0..6 {
-            for j in 0..6 {
-                let product: f64 = (0..5).map(|m| entries[5 * i + m] * entries[5 * j + m]).sum();
-                rows[i][j] = scale * (product + if i == j { 1.0 } else { 0.0 });
-            }
-        }
-        Elasticity::new(rows).ok()
-    })
-}
-
 fn case() -> impl Strategy<Value = Case> {
     let solid = || {
-        (positive(), elasticity()).prop_map(|(density, elasticity)| Bone { density, elasticity })
+        (positive(), random_bones::elasticity())
+            .prop_map(|(density, elasticity)| Bone { density, elasticity })
     };
     let sublayer = (1e-6..5e-3, solid());
     let sublayer = sublayer.prop_map(|(thickness, solid)| Sublayer { thickness, solid });
@@ -292,7 +254,7 @@ type AskedPosterior = Option<(u64, u64, [(PriorDistribution, f64); PARAMETERS])>
 
 fn posterior() -> impl Strategy<Value = AskedPosterior> {
     let law = prop::sample::select(PriorDistribution::ALL.to_vec());
-    let laws = prop::array::uniform10((law, 0.01..1.0));
+    let laws = prop::array::uniform13((law, 0.01..1.0));
     prop::option::of((100_u64..=20_000, 20_u64..=2_000, laws))
 }
 
@@ -310,7 +272,10 @@ fn know_thickness(data: &mut Data, setup: &Setup) {
     if let Measurements::Groups(groups) = &mut data.measurements {
         for (place, group) in groups.iter_mut().enumerate() {
             let thickness = setup.layers.bone_thickness * (1.0 + 1e-4 * place as f64);
-            group.known = KnownQuantities::new([Some(thickness), None, None]);
+            group.known = KnownQuantities::new(
+                Parameter::OF_SETUP
+                    .map(|one| (one == Parameter::BoneThickness).then_some(thickness)),
+            );
         }
     }
 }
@@ -344,7 +309,7 @@ fn job() -> impl Strategy<Value = JobSpecification> {
     );
     let objective = prop::sample::select(Objective::ALL.to_vec());
     let settings = (random(), monte_carlo(), search(), objective, posterior());
-    let setup = (setup(), prop::option::of(pores()))
+    let setup = (setup(), prop::option::of(random_bones::pores()))
         .prop_map(|(setup, pores)| Setup { pores: pores.unwrap_or_default(), ..setup });
     (any::<bool>(), setup, data(), parameters, settings).prop_map(
         |(identification, setup, data, parameters, settings)| {

@@ -84,12 +84,17 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
     if constants.any(wrong) {
         return;
     }
-    let pores = &specification.setup.pores;
-    if let Err(inadmissible) = pores.mean_solid(&specification.start()) {
-        violations.add(
-            "parameters",
-            format!("the point of starts and fixed values is not admissible: {inadmissible}"),
-        );
+    let (start, pores) = (specification.start(), &specification.setup.pores);
+    let refused = match start.constants().elasticity() {
+        Err(inadmissible) => Some(inadmissible.to_string()),
+        Ok(_) if ["bone", "parameters"].iter().any(|field| violations.has_at_or_below(field)) => {
+            None
+        }
+        Ok(_) => pores.mean_solid(&start).err().map(|none| none.to_string()),
+    };
+    if let Some(refused) = refused {
+        let message = format!("the point of starts and fixed values is not admissible: {refused}");
+        violations.add("parameters", message);
     }
 }
 

@@ -34,7 +34,9 @@ fn searched(method: u64, realizations: u64, evaluations: u64, seed: u64) -> JobS
     if seed.is_multiple_of(4) {
         let group = |name: &str, velocity: f64, thickness: f64| {
             let known = Some(thickness).filter(|_| seed.is_multiple_of(8));
-            let known = KnownQuantities::new([known, None, None]);
+            let known = KnownQuantities::new(
+                Parameter::OF_SETUP.map(|one| known.filter(|_| one == Parameter::BoneThickness)),
+            );
             Group { known, ..Group::new(name, vec![0.97 * velocity, 1.03 * velocity]) }
         };
         let groups = vec![group("left", 3900.0, 3e-3), group("right", 4000.0, 5e-3)];

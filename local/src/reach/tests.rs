@@ -134,7 +134,9 @@ fn a_group_is_compared_with_its_own_setup() {
     let velocities: Vec<f64> =
         (0..20).map(|i| 3400.0 * (1.0 + 0.02 * f64::from(i % 5 - 2))).collect();
     let lines = |thickness: Option<f64>| {
-        let known = KnownQuantities::new([thickness, None, None]);
+        let known = KnownQuantities::new(
+            Parameter::OF_SETUP.map(|one| thickness.filter(|_| one == Parameter::BoneThickness)),
+        );
         let slow = Group { known, ..Group::new("slow", velocities.clone()) };
         out_of_reach(&job(Data::from_groups(vec![slow]), FIXED)).join("\n")
     };

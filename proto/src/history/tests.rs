@@ -85,9 +85,9 @@ fn the_ending_of_a_group_survives() {
     let missing = v1::GroupEnding { status: 0, ..message };
     assert_eq!(group_ending_from_message(&missing), Err(Malformed::Missing { field: "status" }));
     let point = Some(point_to_message(&Point::of_bone([1.0; 7])));
-    let row = v1::EvaluationRow { point, varied: Some(11), ..v1::EvaluationRow::default() };
+    let row = v1::EvaluationRow { point, varied: Some(14), ..v1::EvaluationRow::default() };
     assert_eq!(
         evaluation_from_message(&row),
-        Err(Malformed::UnknownValue { field: "varied", value: 11 })
+        Err(Malformed::UnknownValue { field: "varied", value: 14 })
     );
 }

@@ -1,0 +1,45 @@
+//! Random elasticities, and random pores of a bone, all of them valid.
+
+use osteon_common::elasticity::Elasticity;
+use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
+use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
+use proptest::prelude::*;
+
+pub(super) fn pores() -> impl Strategy<Value = Pores> {
+    let shape = prop::sample::select(ProfileShape::ALL.to_vec());
+    let homogenisation = prop::sample::select(Homogenisation::ALL.to_vec());
+    let porosities = (any::<bool>(), 0.01..0.32, 0.01..0.32);
+    (porosities, shape, 2_u32..=16, homogenisation, 0.0..1e10, 0.0..1600.0).prop_map(
+        |((is_profile, one, other), shape, sublayers, homogenisation, bulk_modulus, density)| {
+            let model =
+                PorosityModel { homogenisation, fluid: PoreFluid { bulk_modulus, density } };
+            let mut pores = Pores { model, ..Pores::default() };
+            if !is_profile {
+                pores.porosity = Some(one);
+                return pores;
+            }
+            let profile =
+                PorosityProfile { surface: Some(one), marrow: Some(other), shape, sublayers };
+            pores.profile = match shape {
+                ProfileShape::Linear => profile,
+                ProfileShape::Endosteal => PorosityProfile { sublayers: 6, ..profile },
+            };
+            pores
+        },
+    )
+}
+
+/// Positive definite, of any size between 1 Pa and 1e12 Pa, with all 36 entries.
+pub(super) fn elasticity() -> impl Strategy<Value = Elasticity> {
+    let entries = prop::array::uniform32(-1.0..1.0);
+    (entries, 1.0..1e12).prop_filter_map("not positive definite", |(entries, scale)| {
+        let mut rows = [[0.0; 6]; 6];
+        for i in 0..6 {
+            for j in 0..6 {
+                let product: f64 = (0..5).map(|m| entries[5 * i + m] * entries[5 * j + m]).sum();
+                rows[i][j] = scale * (product + if i == j { 1.0 } else { 0.0 });
+            }
+        }
+        Elasticity::new(rows).ok()
+    })
+}
