@@ -20,6 +20,7 @@ use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::probe::{Probe, Receivers, Source};
+use osteon_common::pulse::{PulseForm, PulseShape};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_files::document::Format;
@@ -70,11 +71,17 @@ fn solver() -> impl Strategy<Value = SolverSettings> {
     prop_oneof![exact, hybrid]
 }
 
+fn pulse_form() -> impl Strategy<Value = PulseForm> {
+    let tone = (1.0..6.0).prop_map(|cycles| PulseForm { shape: PulseShape::Tone, cycles });
+    let ricker = PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() };
+    prop_oneof![Just(PulseForm::default()), tone, Just(ricker)]
+}
+
 fn setup() -> impl Strategy<Value = Setup> {
     let layers = (fluid(), 0.5e-3..8e-3, fluid(), prop::array::uniform3(attenuation()));
     let heights = (0.5e-3..3.9e-3, 0.5e-3..3.9e-3);
     let receivers = (5e-3..20e-3, 0.2e-3..1e-3, 3_u32..=32, any::<bool>());
-    let pulse = (0.5e6..1.5e6, positive());
+    let pulse = (0.5e6..1.5e6, positive(), pulse_form(), 0.0..0.99);
     let settings = (any::<bool>(), 1e-300..1.0, solver(), any::<bool>());
     (layers, -10e-3..10e-3, heights, receivers, pulse, settings).prop_map(
         |(layers, x1, (x3, receivers_x3), row, pulse, settings)| {
@@ -94,6 +101,8 @@ fn setup() -> impl Strategy<Value = Setup> {
                 probe: Probe {
                     center_frequency: pulse.0,
                     amplitude: pulse.1,
+                    pulse: pulse.2,
+                    element_width: pulse.3 * pitch,
                     source: Source { x1, x3 },
                     receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },
                     // Heights change by a few micrometres.
@@ -366,11 +375,13 @@ fn change_prior(job: &mut JobSpecification, prior: PosteriorPrior) {
     job.posterior.get_or_insert_default().priors[6] = prior;
 }
 
-const EDITS: [Edit; 20] = [
+const EDITS: [Edit; 22] = [
     |job, x| job.setup.layers.coupling.thickness = x,
     |job, x| job.setup.layers.bone_thickness = x,
     |job, x| job.setup.layers.marrow.sound_speed = x,
     |job, x| job.setup.probe.center_frequency = x,
+    |job, x| job.setup.probe.pulse.cycles = x,
+    |job, x| job.setup.probe.element_width = x,
     |job, x| job.setup.probe.source.x1 = x,
     |job, x| job.setup.probe.source.x3 = x,
     |job, x| job.setup.probe.receivers.first_x1 = x,
