@@ -95,8 +95,8 @@ impl Pulse {
         }
     }
 
-    /// Returns the ratio of |F| at a tone's first extremum to that at the largest of its first three, which are
-    /// less than 1.2 periods apart; 1 for other pulses.
+    /// Returns the ratio of |F| at a tone's first extremum to that at the largest of its first three, which
+    /// are less than 1.2 periods apart; 1 for other pulses.
     fn onset(&self) -> f64 {
         if self.form.tone_cycles().is_none() {
             return 1.0;
