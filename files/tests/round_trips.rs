@@ -20,7 +20,6 @@ use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::probe::{Probe, Receivers, Source};
-use osteon_common::pulse::{PulseForm, PulseShape};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_files::document::Format;
@@ -28,6 +27,11 @@ use osteon_files::file_error::ContentError;
 use osteon_files::{case_file, job_file};
 use osteon_fuzz::properties;
 use proptest::prelude::*;
+
+#[path = "support/random_setup_parts.rs"]
+mod random_setup_parts;
+
+use random_setup_parts::{attenuation, pulse_form, tone};
 
 const FORMATS: [Format; 2] = [Format::Toml, Format::Json];
 const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
@@ -47,15 +51,6 @@ fn fluid() -> impl Strategy<Value = Fluid> {
     })
 }
 
-fn attenuation() -> impl Strategy<Value = Attenuation> {
-    prop::option::of((2.0..1e3, 0.2e6..5e6)).prop_map(|given| match given {
-        None => Attenuation::default(),
-        Some((quality, reference_frequency)) => {
-            Attenuation { quality_factor: Some(quality), reference_frequency }
-        }
-    })
-}
-
 fn solver() -> impl Strategy<Value = SolverSettings> {
     let exact = (0.5..1.5)
         .prop_map(|refinement| SolverSettings { refinement, ..SolverSettings::default() });
@@ -69,12 +64,6 @@ fn solver() -> impl Strategy<Value = SolverSettings> {
         },
     );
     prop_oneof![exact, hybrid]
-}
-
-fn pulse_form() -> impl Strategy<Value = PulseForm> {
-    let tone = (1.0..6.0).prop_map(|cycles| PulseForm { shape: PulseShape::Tone, cycles });
-    let ricker = PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() };
-    prop_oneof![Just(PulseForm::default()), tone, Just(ricker)]
 }
 
 fn setup() -> impl Strategy<Value = Setup> {
@@ -380,7 +369,7 @@ const EDITS: [Edit; 22] = [
     |job, x| job.setup.layers.bone_thickness = x,
     |job, x| job.setup.layers.marrow.sound_speed = x,
     |job, x| job.setup.probe.center_frequency = x,
-    |job, x| job.setup.probe.pulse = PulseForm { shape: PulseShape::Tone, cycles: x },
+    |job, x| job.setup.probe.pulse = tone(x),
     |job, x| job.setup.probe.element_width = x,
     |job, x| job.setup.probe.source.x1 = x,
     |job, x| job.setup.probe.source.x3 = x,
