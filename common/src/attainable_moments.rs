@@ -84,7 +84,8 @@ fn velocities(ranges: &[Range; PARAMETERS], setup: &Setup) -> (f64, f64) {
     // An attenuated arrival consists of the pulse's frequencies and somewhat higher ones.
     let (attenuation, center) = (&setup.layers.bone_attenuation, setup.probe.center_frequency);
     let lowest = VELOCITY_FACTORS.0 * attenuation.speed(center) * bar_velocity_min;
-    let highest = VELOCITY_FACTORS.1 * attenuation.fastest(center) * bulk_velocity_max;
+    let highest =
+        VELOCITY_FACTORS.1 * attenuation.fastest(setup.probe.band_unit()) * bulk_velocity_max;
     (apparent(setup, lowest), apparent(setup, highest))
 }
 

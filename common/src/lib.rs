@@ -49,6 +49,7 @@ pub mod porosity;
 pub mod posterior;
 mod posterior_settings;
 pub mod probe;
+pub mod pulse;
 pub mod quantile;
 pub mod random_quantities;
 pub mod realization;

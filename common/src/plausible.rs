@@ -133,6 +133,14 @@ pub(crate) const PITCH: PlausibleRange = PlausibleRange {
     possible: (0.0, 0.1),
     units: LENGTHS,
 };
+/// Width of a probe's elements; lines have none.
+pub(crate) const ELEMENT_WIDTH: PlausibleRange = PlausibleRange {
+    unit: "m",
+    typical: 0.6e-3,
+    usual: (0.0, 10e-3),
+    possible: (0.0, 0.1),
+    units: LENGTHS,
+};
 /// Size of the hybrid method's elements.
 pub(crate) const ELEMENT_SIZE: PlausibleRange = PlausibleRange {
     unit: "m",

@@ -3,7 +3,8 @@
 use crate::accepted::{Interval, WholeRange};
 use crate::fields::{Fields, Key, Number, Section};
 use crate::limits::{RECEIVERS_MAX, RECEIVERS_MIN};
-use crate::plausible::{FREQUENCY, HEIGHT, PITCH};
+use crate::plausible::{ELEMENT_WIDTH, FREQUENCY, HEIGHT, PITCH};
+use crate::pulse::PulseForm;
 
 /// Largest accepted tilt, rad: 11°, far more than any operator's hand.
 const TILT_MAX: f64 = 0.2;
@@ -50,7 +51,7 @@ impl Receivers {
     }
 }
 
-/// The probe and its pulse F(t) = amplitude · sin(2π fc t) · exp(-4 (fc t - 1)²), t ≥ 0.
+/// The probe and its pulse, by default F(t) = amplitude · sin(2π fc t) · exp(-4 (fc t - 1)²), t ≥ 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Probe {
     /// Centre frequency fc of the pulse, Hz.
@@ -58,6 +59,11 @@ pub struct Probe {
     /// Amplitude F1 of the pulse. The paper gives its unit as N; dimensionally it is m²/s², and
     /// then pressures are in Pa.
     pub amplitude: f64,
+    /// Form of the pulse.
+    pub pulse: PulseForm,
+    /// Width along the probe, m, of the source's and of each receiver's element: the source emits evenly
+    /// over it, and a receiver averages over it. 0: lines. Below the pitch and the nearest distance.
+    pub element_width: f64,
     /// The line source.
     pub source: Source,
     /// The receivers.
@@ -96,6 +102,19 @@ impl Probe {
         })
     }
 
+    /// Returns how far an element extends along the bone and upwards, m; the latter is negative if
+    /// receivers are the lower, the farther they are.
+    pub fn element_extent(&self) -> (f64, f64) {
+        let (sin, cos) = libm::sincos(self.tilt);
+        (self.element_width * cos, self.element_width * sin)
+    }
+
+    /// Returns the frequency, Hz, in which bands are measured: the centre frequency, or more if the pulse
+    /// needs a wider band than the paper's.
+    pub fn band_unit(&self) -> f64 {
+        self.center_frequency * self.pulse.bandwidth()
+    }
+
     /// Returns the height of the lowest receiver, m.
     pub fn lowest_receiver(&self) -> f64 {
         self.places().map(|place| place.x3).fold(f64::INFINITY, f64::min)
@@ -120,6 +139,8 @@ impl Default for Probe {
         Self {
             center_frequency: 1e6,
             amplitude: 100.0,
+            pulse: PulseForm::default(),
+            element_width: 0.0,
             source: Source { x1: 0.0, x3: 2e-3 },
             receivers: Receivers { first_x1: 11e-3, pitch: 0.8e-3, count: 14, x3: 2e-3 },
             tilt: 0.0,
@@ -139,6 +160,16 @@ impl Section for Probe {
             Key { name: "amplitude", meaning: AMPLITUDE },
             &mut self.amplitude,
             Number::within(Interval::above(0.0, "N")),
+        );
+        fields.table(Key { name: "pulse", meaning: "form of the pulse" }, &mut |fields| {
+            self.pulse.declare(fields);
+        });
+        let width = "width of the source and of each receiver along the probe, over which they emit and \
+                     average; below the pitch and the nearest distance. 0: lines";
+        fields.number(
+            Key { name: "element_width", meaning: width },
+            &mut self.element_width,
+            Number::at_least(0.0, &ELEMENT_WIDTH),
         );
         let source = "the line source; inside the coupling fluid";
         fields.table(Key { name: "source", meaning: source }, &mut |fields| {

@@ -28,7 +28,7 @@ use crate::case::Setup;
 use crate::limits::SAMPLING_PAIRS_MAX;
 use crate::probe::Place;
 use crate::settings::Method;
-use arrivals::{is_audible, lower_echo, reflected_arrival, upper_echo};
+use arrivals::{is_audible, last_reflected_arrival, lower_echo, upper_echo};
 
 pub use arrivals::{
     direct_arrival, earliest_arrival, earliest_echo, echoes_are_audible, fastest, fastest_in,
@@ -239,21 +239,24 @@ impl WaveSampling {
     /// speed bin's speed.
     pub fn for_speed_bin(setup: &Setup, bin: usize, grade: Grade, faces: OuterFaces) -> Self {
         let speed = speed_bin_edge(setup, bin);
-        let fc = setup.probe.center_frequency;
-        // All in periods: length of the reflected wave; latest time of a picked extremum after the
+        let (fc, pulse) = (setup.probe.center_frequency, &setup.probe.pulse);
+        // All in periods, for the paper's pulse: length of the reflected wave; latest time of a picked extremum after the
         // earliest possible arrival; latest time for which the wave of a repeated source must be
         // kept out.
         let (reflected_length, latest_pick, latest_source) = match grade {
             Grade::Quick | Grade::Plain => (1.0, QUICK_LATEST, QUICK_LATEST),
             Grade::Thorough | Grade::Full => (4.0, 2.5, f64::INFINITY),
         };
+        let reflected_length = reflected_length + pulse.lateness();
+        let (latest_pick, latest_source) =
+            (latest_pick + pulse.delay(), latest_source + pulse.delay());
         let damping = wrap_damping(setup, grade);
-        let mut longest = SHORTEST_PERIOD / fc;
+        let mut longest = (SHORTEST_PERIOD + pulse.lateness()) / fc;
         let mut last = 0.0_f64;
         for place in setup.probe.places() {
             let earliest = earliest_arrival(setup, place, speed);
             let direct = direct_arrival(setup, place);
-            let reflected = reflected_arrival(setup, place) + reflected_length / fc;
+            let reflected = last_reflected_arrival(setup, place) + reflected_length / fc;
             let pick = direct.min(earliest + latest_pick / fc);
             longest = longest
                 .max(PERIOD_MARGIN * (reflected - earliest))
@@ -275,10 +278,10 @@ impl WaveSampling {
     /// Returns the sampling for traces from 0 to `duration` (s) of bones whose waves are no faster
     /// than `speed` (m/s).
     pub fn for_traces(setup: &Setup, speed: f64, duration: f64) -> Self {
-        let fc = setup.probe.center_frequency;
+        let unit = setup.probe.band_unit();
         let period = TRACE_MARGIN * duration;
         let mut sampling = Self::new(setup, Grade::Thorough, WRAP_DAMPING, speed, period, duration);
-        sampling.bands = [TRACE_BAND * setup.solver.refinement * thinness(setup) * fc; BANDS];
+        sampling.bands = [TRACE_BAND * setup.solver.refinement * thinness(setup) * unit; BANDS];
         sampling.upper_echoes = true;
         sampling.lower_echoes = true;
         sampling.unit = f64::INFINITY;
@@ -289,9 +292,11 @@ impl WaveSampling {
         let refinement = setup.solver.refinement;
         let coupling = &setup.layers.coupling;
         let lowest = setup.probe.lowest_receiver();
-        let heights = lowest + setup.probe.source.x3;
+        let (_, upwards) = setup.probe.element_extent();
+        let heights = lowest + setup.probe.source.x3 - upwards.abs();
         let (_, farthest) = nearest_and_farthest(setup);
         let fc = setup.probe.center_frequency;
+        let band_unit = setup.probe.band_unit();
         let bands = relative_bands(grade, refinement, thinness(setup));
         let unit = match grade {
             Grade::Quick => thinness(setup).min(1.4),
@@ -316,13 +321,13 @@ impl WaveSampling {
             period,
             frequency_step: 2.0 * PI / period,
             damping: damping / period,
-            bands: bands.map(|band| band * fc),
+            bands: bands.map(|band| band * band_unit),
             wavenumber_step: 2.0 * PI / length,
             evanescent_limit: (damping + evanescence) / heights,
             upper_echoes: false,
             lower_echoes: false,
             sound_speed: coupling.sound_speed,
-            unit: unit * fc,
+            unit: unit * band_unit,
         }
     }
 
@@ -418,7 +423,7 @@ impl WaveSampling {
 /// Returns the highest frequency of the last passes of a grade, Hz.
 pub fn widest_band(setup: &Setup, grade: Grade) -> f64 {
     let [.., last] = relative_bands(grade, setup.solver.refinement, thinness(setup));
-    last * setup.probe.center_frequency
+    last * setup.probe.band_unit()
 }
 
 /// Returns the highest frequencies of the passes, as multiples of the centre frequency.

@@ -122,7 +122,9 @@ impl Section for Picking {
             Key {
                 name: "threshold",
                 meaning: "an extremum can be the first arrival only if its size relative to its \
-                          packet's peak, in the median over the receivers, is above this",
+                          packet's peak, in the median over the receivers, is above this; it is lower for \
+                          pulses that begin gently \
+                          ([physics.md](physics.md#the-first-arriving-signal))",
             },
             &mut self.threshold,
             Number::within(Interval::between(0.0, 1.0, "of the packet's peak")),

@@ -21,6 +21,7 @@ use osteon_common::parameters::Parameter;
 use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
 use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
 use osteon_common::probe::{Probe, Receivers, Source};
+use osteon_common::pulse::{PulseForm, PulseShape};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_files::document::Format;
@@ -71,6 +72,8 @@ const DEFAULT_SETUP: Setup = Setup {
     probe: Probe {
         center_frequency: 1e6,
         amplitude: 100.0,
+        pulse: PulseForm { shape: PulseShape::Paper, cycles: 3.0 },
+        element_width: 0.0,
         source: Source { x1: 0.0, x3: 2e-3 },
         receivers: Receivers { first_x1: 11e-3, pitch: 0.8e-3, count: 14, x3: 2e-3 },
         tilt: 0.0,
@@ -255,6 +258,8 @@ fn a_complete_job_means_what_it_says() {
             probe: Probe {
                 center_frequency: 0.9e6,
                 amplitude: 99.0,
+                pulse: PulseForm { shape: PulseShape::Tone, cycles: 4.5 },
+                element_width: 0.5e-3,
                 source: Source { x1: 1e-3, x3: 3e-3 },
                 receivers: Receivers { first_x1: 13e-3, pitch: 0.9e-3, count: 12, x3: 2.5e-3 },
                 tilt: 0.001,

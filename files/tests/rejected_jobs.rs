@@ -20,6 +20,8 @@ mod decays;
 mod objective;
 #[path = "rejected_jobs/posterior.rs"]
 mod posterior;
+#[path = "rejected_jobs/probe.rs"]
+mod probe;
 #[path = "rejected_jobs/random.rs"]
 mod random;
 #[path = "rejected_jobs/setup_parameters.rs"]
@@ -85,9 +87,6 @@ fn setup() {
             ("center_frequency = 0.9e6", "center_frequency = 0"),
             ("center_frequency = 0.9e6", "center_frequency = 1e12"),
             ("amplitude        = 99.0", "amplitude = 1e400"),
-            ("tilt = 0.001", "tilt = 1.0"),
-            ("tilt = 0.001", "tilt = -0.2"),
-            ("bidirectional = true", "bidirectional = \"both\""),
             ("x1 = 1e-3, x3 = 3e-3", "x1 = nan, x3 = 0.0"),
             ("x3 = 3e-3", "x3 = 11e-3"),
             ("x3 = 2.5e-3", "x3 = -2.5e-3"),

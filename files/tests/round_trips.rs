@@ -31,6 +31,11 @@ use osteon_files::{case_file, job_file};
 use osteon_fuzz::properties;
 use proptest::prelude::*;
 
+#[path = "support/random_setup_parts.rs"]
+mod random_setup_parts;
+
+use random_setup_parts::{attenuation, pulse_form, tone};
+
 const FORMATS: [Format; 2] = [Format::Toml, Format::Json];
 const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
 
@@ -46,15 +51,6 @@ fn fluid() -> impl Strategy<Value = Fluid> {
         density,
         sound_speed,
         attenuation: Attenuation::default(),
-    })
-}
-
-fn attenuation() -> impl Strategy<Value = Attenuation> {
-    prop::option::of((2.0..1e3, 0.2e6..5e6)).prop_map(|given| match given {
-        None => Attenuation::default(),
-        Some((quality, reference_frequency)) => {
-            Attenuation { quality_factor: Some(quality), reference_frequency }
-        }
     })
 }
 
@@ -77,7 +73,7 @@ fn setup() -> impl Strategy<Value = Setup> {
     let layers = (fluid(), 0.5e-3..8e-3, fluid(), prop::array::uniform3(attenuation()));
     let heights = (0.5e-3..3.9e-3, 0.5e-3..3.9e-3);
     let receivers = (5e-3..20e-3, 0.2e-3..1e-3, 3_u32..=32, any::<bool>());
-    let pulse = (0.5e6..1.5e6, positive());
+    let pulse = (0.5e6..1.5e6, positive(), pulse_form(), 0.0..0.99);
     let settings = (any::<bool>(), 1e-300..1.0, solver(), any::<bool>());
     (layers, -10e-3..10e-3, heights, receivers, pulse, settings).prop_map(
         |(layers, x1, (x3, receivers_x3), row, pulse, settings)| {
@@ -97,6 +93,8 @@ fn setup() -> impl Strategy<Value = Setup> {
                 probe: Probe {
                     center_frequency: pulse.0,
                     amplitude: pulse.1,
+                    pulse: pulse.2,
+                    element_width: pulse.3 * pitch,
                     source: Source { x1, x3 },
                     receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },
                     // Heights change by a few micrometres.
@@ -363,11 +361,13 @@ fn change_prior(job: &mut JobSpecification, prior: PosteriorPrior) {
     job.posterior.get_or_insert_default().priors[6] = prior;
 }
 
-const EDITS: [Edit; 20] = [
+const EDITS: [Edit; 22] = [
     |job, x| job.setup.layers.coupling.thickness = x,
     |job, x| job.setup.layers.bone_thickness = x,
     |job, x| job.setup.layers.marrow.sound_speed = x,
     |job, x| job.setup.probe.center_frequency = x,
+    |job, x| job.setup.probe.pulse = tone(x),
+    |job, x| job.setup.probe.element_width = x,
     |job, x| job.setup.probe.source.x1 = x,
     |job, x| job.setup.probe.source.x3 = x,
     |job, x| job.setup.probe.receivers.first_x1 = x,

@@ -21,6 +21,7 @@ pub(crate) mod attenuation;
 mod bin_tables;
 mod blending;
 pub(crate) mod direct;
+pub(crate) mod element_average;
 mod estimated;
 mod factors;
 mod grade_caches;

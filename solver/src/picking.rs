@@ -1,10 +1,12 @@
 //! The first arriving signal: one extremum, the same at every receiver, and the line through its
 //! times.
 
+use osteon_common::case::Setup;
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::{self, Picking};
 
 use crate::failure::Failure;
+use crate::pulse::relative_onset;
 
 /// An extremum below this fraction of the window's largest one is numerical noise.
 pub(crate) const FLOOR: f64 = 1e-3;
@@ -81,9 +83,17 @@ pub(crate) struct Pick {
     pub(crate) prominence: f64,
 }
 
+/// Returns the criterion for the signals of a setup: its threshold is the one for the paper's pulse, and is
+/// lower for a pulse that begins more gently.
+pub(crate) fn criterion(setup: &Setup) -> Picking {
+    let threshold = setup.picking.threshold * relative_onset(&setup.probe);
+    Picking { threshold, ..setup.picking }
+}
+
 /// Picks the first arriving signal.
 ///
-/// `windows` and `distances` (m, from the source) have one entry per receiver.
+/// `picking` is the [`criterion`] of the setup; `windows` and `distances` (m, from the source) have one entry
+/// per receiver.
 ///
 /// # Errors
 /// `DirectWaveFirst` if a receiver has no extremum before the direct wave, `NoArrival` if one has

@@ -8,6 +8,7 @@ use osteon_common::elasticity::{Elasticity, EngineeringConstants};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Point;
 use osteon_common::probe::{Probe, Receivers, Source};
+use osteon_common::pulse::{PulseForm, PulseShape};
 use osteon_common::realization::Ensemble;
 use osteon_common::sampling::{WaveSampling, pair_count};
 use osteon_common::violations::Violations;
@@ -44,6 +45,12 @@ fn largest_tilt(heights: (f64, f64), thickness: f64, row: (f64, f64, u32)) -> f6
     (across / along).min(0.2)
 }
 
+fn pulse() -> impl Strategy<Value = PulseForm> {
+    let tone = (1.0..6.0).prop_map(|cycles| PulseForm { shape: PulseShape::Tone, cycles });
+    let ricker = PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() };
+    prop_oneof![2 => Just(PulseForm::default()), 1 => tone, 1 => Just(ricker)]
+}
+
 /// Receivers from 1 mm to 50 mm, rarely much nearer, up to 64 of them, up to 10 mm apart.
 fn setup() -> impl Strategy<Value = Setup> {
     let probe = (
@@ -55,6 +62,7 @@ fn setup() -> impl Strategy<Value = Setup> {
             3_u32..=64,
         ),
         (prop_oneof![2 => Just(0.0), 1 => -0.9..0.9], any::<bool>()),
+        (pulse(), prop_oneof![2 => Just(0.0), 1 => 0.0..0.99]),
     );
     let plate = prop_oneof![1 => decades(-6.0, -3.3), 3 => decades(-3.3, -2.09)];
     (fluid(), plate, fluid(), probe).prop_map(
@@ -62,7 +70,7 @@ fn setup() -> impl Strategy<Value = Setup> {
             coupling,
             bone_thickness,
             marrow,
-            (center_frequency, heights, row, (share, bidirectional)),
+            (center_frequency, heights, row, (share, bidirectional), (pulse, width)),
         )| Setup {
             layers: Layers { coupling, bone_thickness, marrow, ..Layers::default() },
             probe: Probe {
@@ -70,6 +78,8 @@ fn setup() -> impl Strategy<Value = Setup> {
                 bidirectional,
                 center_frequency,
                 amplitude: 100.0,
+                pulse,
+                element_width: width * row.0.min(row.1),
                 source: Source { x1: 0.0, x3: heights.0 * coupling.thickness },
                 receivers: Receivers {
                     first_x1: row.0,

@@ -26,6 +26,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
     pores(&setup.pores, violations);
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);
+    element_width(&setup.probe, violations);
     tilted(setup, violations);
     method(setup, violations);
     sampling(setup, violations);
@@ -94,6 +95,24 @@ fn one_side(probe: &Probe, violations: &mut Violations) {
     }
 }
 
+/// Checks that no two elements overlap.
+fn element_width(probe: &Probe, violations: &mut Violations) {
+    if violations.has_at_or_below("probe") {
+        return;
+    }
+    let nearest = probe.distances().fold(probe.receivers.pitch, f64::min);
+    if probe.element_width >= nearest {
+        violations.add(
+            "probe.element_width",
+            format!(
+                "is {:?}; elements must not overlap: it must be below {nearest:?} m, the distance of the \
+                 nearest two of source and receivers",
+                probe.element_width
+            ),
+        );
+    }
+}
+
 /// Checks that a tilted probe remains inside fluid 1, and in front of its source.
 fn tilted(setup: &Setup, violations: &mut Violations) {
     let probe = &setup.probe;
@@ -107,8 +126,10 @@ fn tilted(setup: &Setup, violations: &mut Violations) {
     let other_side = probe.bidirectional.then(|| probe.from_other_side());
     for probe in [*probe].into_iter().chain(other_side) {
         let heights = || probe.places().map(|place| place.x3).chain([probe.source.x3]);
-        let lowest = heights().fold(f64::INFINITY, f64::min);
-        let highest = heights().fold(f64::NEG_INFINITY, f64::max);
+        // Elements reach up and down by half their extent.
+        let reach = 0.5 * probe.element_extent().1.abs();
+        let lowest = heights().fold(f64::INFINITY, f64::min) - reach;
+        let highest = heights().fold(f64::NEG_INFINITY, f64::max) + reach;
         if !(lowest > 0.0 && highest < top) {
             violations.add(
                 "probe.tilt",
@@ -123,7 +144,7 @@ fn tilted(setup: &Setup, violations: &mut Violations) {
             return;
         }
     }
-    if probe.places().any(|place| place.x <= 0.0) {
+    if probe.places().any(|place| place.x <= probe.element_extent().0) {
         violations.add(
             "probe.tilt",
             format!(

@@ -8,26 +8,27 @@ use crate::probe::Place;
 /// at the reference frequency of its attenuation.
 pub fn fastest(setup: &Setup, in_bone: f64) -> f64 {
     let attenuation = &setup.layers.bone_attenuation;
-    let in_bone = in_bone * attenuation.fastest(setup.probe.center_frequency);
+    let in_bone = in_bone * attenuation.fastest(setup.probe.band_unit());
     in_bone.max(fastest_in(&setup.layers.marrow, setup))
 }
 
 /// Returns the highest speed, m/s, of waves in a fluid of the setup.
 pub fn fastest_in(fluid: &Fluid, setup: &Setup) -> f64 {
-    fluid.sound_speed * fluid.attenuation.fastest(setup.probe.center_frequency)
+    fluid.sound_speed * fluid.attenuation.fastest(setup.probe.band_unit())
 }
 
 /// Returns the earliest possible arrival, s, at a receiver's place of a wave that travels along the
 /// bone at `speed` (m/s) and through the coupling fluid at its ends.
 ///
 /// It is a lower bound at every distance: within the critical one the reflected wave arrives later.
+/// Elements of a width are heard from their nearest ends.
 pub fn earliest_arrival(setup: &Setup, place: Place, speed: f64) -> f64 {
     let c1 = setup.layers.coupling.sound_speed;
     let heights = place.x3 + setup.probe.source.x3;
     if speed <= c1 {
-        return reflected_arrival(setup, place);
+        return reflected_arrival(setup, place) - setup.probe.element_width / c1;
     }
-    place.x / speed + heights * slowness(c1, speed)
+    place.x / speed + heights * slowness(c1, speed) - lead(setup, c1, speed)
 }
 
 /// Returns the earliest possible arrival, s, at a receiver's place of a reflection of an outer face, for
@@ -42,18 +43,23 @@ pub fn echoes_are_audible(setup: &Setup, speed: f64) -> bool {
     is_audible(setup, speed, earliest_echo)
 }
 
-/// Returns the arrival, s, of the direct wave in the coupling fluid at a receiver's place.
+/// Returns the arrival, s, of the direct wave in the coupling fluid at a receiver's place, from the nearest
+/// ends of the elements.
 pub fn direct_arrival(setup: &Setup, place: Place) -> f64 {
-    let (x, across) = (place.x, place.x3 - setup.probe.source.x3);
+    let (along, upwards) = setup.probe.element_extent();
+    let (x, across) = (place.x - along, place.x3 - setup.probe.source.x3 - upwards);
     x.mul_add(x, across * across).sqrt() / setup.layers.coupling.sound_speed
 }
 
-/// Returns the smallest and the largest distance of a receiver from the source along the bone, m.
+/// Returns the smallest and the largest distance along the bone, m, of a receiver from the source, each
+/// between the ends of their elements.
 pub fn nearest_and_farthest(setup: &Setup) -> (f64, f64) {
     let of = |(nearest, farthest): (f64, f64), place: Place| {
         (nearest.min(place.x), farthest.max(place.x))
     };
-    setup.probe.places().fold((f64::INFINITY, 0.0), of)
+    let (nearest, farthest) = setup.probe.places().fold((f64::INFINITY, 0.0), of);
+    let width = setup.probe.element_width;
+    (nearest - width, farthest + width)
 }
 
 /// Returns √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at
@@ -67,10 +73,25 @@ pub(super) fn is_audible(setup: &Setup, speed: f64, echo: fn(&Setup, Place, f64)
     setup.probe.places().any(|place| echo(setup, place, speed) <= direct_arrival(setup, place))
 }
 
-/// Returns the arrival, s, at a receiver's place of the wave reflected by the bone's upper face.
-pub(super) fn reflected_arrival(setup: &Setup, place: Place) -> f64 {
+/// Returns the end, s, of the arrival at a receiver's place of the wave reflected by the bone's upper face:
+/// the time from the farthest ends of the elements.
+pub(super) fn last_reflected_arrival(setup: &Setup, place: Place) -> f64 {
+    let across_elements = setup.probe.element_width / setup.layers.coupling.sound_speed;
+    reflected_arrival(setup, place) + across_elements
+}
+
+/// Returns the arrival, s, at a receiver's place of the wave reflected by the bone's upper face, from the
+/// middles of the elements.
+fn reflected_arrival(setup: &Setup, place: Place) -> f64 {
     let (x, heights) = (place.x, place.x3 + setup.probe.source.x3);
     x.mul_add(x, heights * heights).sqrt() / setup.layers.coupling.sound_speed
+}
+
+/// Returns at most how much earlier, s, than between their middles a wave travels between the ends of two
+/// elements, if it leaves and reaches them through a fluid with this speed of sound (m/s).
+fn lead(setup: &Setup, sound_speed: f64, speed: f64) -> f64 {
+    let (along, upwards) = setup.probe.element_extent();
+    along / speed + upwards.abs() * slowness(sound_speed, speed)
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the coupling's outer face.
@@ -78,6 +99,7 @@ pub(super) fn upper_echo(setup: &Setup, place: Place, speed: f64) -> f64 {
     let coupling = &setup.layers.coupling;
     let path = 2.0 * coupling.thickness - (place.x3 - setup.probe.source.x3).abs();
     place.x / speed + path * slowness(coupling.sound_speed, speed)
+        - lead(setup, coupling.sound_speed, speed)
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the marrow's outer face.

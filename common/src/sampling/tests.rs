@@ -109,3 +109,38 @@ fn the_count_is_estimated_from_above_where_it_is_not_counted() {
     assert!(pair_count(&setup(|s| s.probe.receivers.pitch = 10.0)) > SAMPLING_PAIRS_MAX);
     assert!(pair_count(&setup(|s| s.probe.source.x3 = 1e-9)) < SAMPLING_PAIRS_MAX);
 }
+
+/// The bounds of arrivals between elements of a width, against the least over all places on them.
+#[test]
+fn wide_elements_are_heard_from_their_nearest_ends() {
+    for tilt in [0.0, 0.04, -0.04] {
+        let lines = setup(|s| s.probe.tilt = tilt);
+        let mut wide = lines;
+        wide.probe.element_width = 0.7e-3;
+        let (sin, cos) = libm::sincos(tilt);
+        let ends = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)];
+        let least = |place: Place, arrival: &dyn Fn(&Setup, Place) -> f64| {
+            let between = ends.map(|(source, receiver)| {
+                let mut moved = lines;
+                moved.probe.source.x3 += 0.35e-3 * source * sin;
+                let x = place.x + 0.35e-3 * (receiver - source) * cos;
+                arrival(&moved, Place { x, x3: place.x3 + 0.35e-3 * receiver * sin })
+            });
+            between.into_iter().fold(f64::INFINITY, f64::min)
+        };
+        for place in wide.probe.places() {
+            let direct = direct_arrival(&wide, place);
+            assert!((direct - least(place, &direct_arrival)).abs() < 1e-15, "{tilt}: {direct}");
+            for (speed, steepness) in [(1400.0, 0.1), (3960.1, 0.0)] {
+                let bound = earliest_arrival(&wide, place, speed);
+                let earliest = least(place, &|s, place| earliest_arrival(s, place, speed));
+                // The bound lets both ends of a tilted probe be the nearer one to the bone, and those of
+                // slow bones lie on the way.
+                let slack = 0.7e-3 * (steepness + sin.abs()) / 1500.0 + 1e-15;
+                assert!((0.0..slack).contains(&(earliest - bound + 1e-18)), "{tilt}, {speed}");
+                let echo = least(place, &|s, place| earliest_echo(s, place, speed));
+                assert!(earliest_echo(&wide, place, speed) <= echo, "{tilt}, {speed}");
+            }
+        }
+    }
+}

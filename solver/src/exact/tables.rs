@@ -10,6 +10,7 @@ use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling};
 
 use crate::complex::Complex;
 use crate::exact::attenuation::LosslessFrequencies;
+use crate::exact::element_average::ElementAverage;
 use crate::exact::height_factors::{HeightFactors, height_factors};
 use crate::exact::table_memory::TableMemory;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
@@ -56,6 +57,8 @@ struct Heights {
     step: f64,
     /// Whether receivers with larger numbers are lower.
     falling: bool,
+    /// What source and receivers average over; `None` if they are lines.
+    elements: Option<ElementAverage>,
 }
 
 /// One complex frequency.
@@ -121,11 +124,8 @@ impl Tables {
         let probe = &setup.probe;
         let runs = sampling.runs();
         let numbers: Vec<usize> = runs.iter().flat_map(|run| run.frequencies()).collect();
-        let spectrum = Pulse::new(amplitude, probe.center_frequency).spectrum(
-            sampling.damping,
-            sampling.period,
-            &numbers,
-        );
+        let spectrum =
+            Pulse::new(amplitude, probe).spectrum(sampling.damping, sampling.period, &numbers);
         let lines: Vec<_> = numbers
             .iter()
             .zip(spectrum)
@@ -264,6 +264,7 @@ impl Heights {
             lowest: probe.lowest_receiver(),
             step: probe.receivers.pitch * libm::sin(probe.tilt).abs(),
             falling: heights.first() > heights.last(),
+            elements: ElementAverage::from_probe(probe),
         }
     }
 
@@ -390,6 +391,7 @@ struct SpectralPoint {
 /// ρ1/(2g) e2 (1 - ea) (1 - eb) (R + 1) / ((1 + R E2) (1 - E2))
 /// ```
 ///
+/// Elements of a width multiply all of it by their factor ([`ElementAverage`]).
 /// If no reflection of the outer face can arrive in a window, ea, eb and E2 are 0. With a tilted probe x3
 /// is the height of the lowest receiver, and 1 - ea is left to the sum over wavenumbers.
 fn spectral_point(
@@ -400,11 +402,14 @@ fn spectral_point(
     k: f64,
 ) -> SpectralPoint {
     let coupling = &setup.layers.coupling;
-    let Heights { source, lowest, .. } = *heights;
+    let Heights { source, lowest, elements, .. } = *heights;
     let one = Complex::new(1.0, 0.0);
     let g = vertical_wavenumber(k, line.lossless.coupling, coupling.sound_speed);
     let damp = |length: f64| (-g.scale(length)).exp();
     let mut factor = damp(source + lowest).scale(coupling.density) / g;
+    if let Some(elements) = elements {
+        factor = factor * elements.factor(k, g);
+    }
     let mut echo = Complex::default();
     if sampling.upper_echoes {
         if !heights.are_different() {

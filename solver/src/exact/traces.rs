@@ -6,7 +6,9 @@ use osteon_common::probe::Place;
 use osteon_common::sampling::{self, WaveSampling, trace_taper};
 use thiserror::Error;
 
+use crate::complex::Complex;
 use crate::exact::direct;
+use crate::exact::element_average::separations;
 use crate::exact::plate_stack::PlateStack;
 use crate::exact::response::Spectra;
 use crate::exact::signal::Signal;
@@ -180,13 +182,22 @@ impl Solver {
         let setup = self.setup();
         let coupling = &setup.layers.coupling;
         let source = setup.probe.source.x3;
-        let travel = |height: f64| libm::hypot(place.x, height) / coupling.sound_speed;
-        let direct = travel(place.x3 - source);
-        let image = travel(2.0 * coupling.thickness - place.x3 - source);
+        let (along, upwards) = setup.probe.element_extent();
+        let shortest = coupling.sound_speed / tables.sampling.whole_band();
+        let travel = |x: f64, height: f64| libm::hypot(x, height) / coupling.sound_speed;
+        let ways = separations(&setup.probe, shortest).into_iter().map(|(node, weight)| {
+            let x = place.x + node * along;
+            let direct = travel(x, place.x3 + node * upwards - source);
+            (weight, direct, travel(x, 2.0 * coupling.thickness - place.x3 - source))
+        });
+        let ways: Vec<_> = ways.collect();
         for (i, line) in tables.lines.iter().enumerate() {
             let s = line.lossless.coupling;
-            let wave = direct::pressure(coupling.density, direct, s)
-                - direct::pressure(coupling.density, image, s);
+            let wave = ways.iter().fold(Complex::default(), |sum, &(weight, direct, image)| {
+                let wave = direct::pressure(coupling.density, direct, s)
+                    - direct::pressure(coupling.density, image, s);
+                sum + wave.scale(weight)
+            });
             let pressure = wave * line.pulse;
             let run = &mut spectrum[i / LANES];
             run.re.0[i % LANES] += pressure.re;

@@ -5,7 +5,7 @@ use osteon_common::sampling::{self, Grade};
 use crate::exact::estimated::Estimated;
 use crate::exact::pass::slow_decay_factor;
 use crate::exact::prepared_setup::PreparedSetup;
-use crate::picking::Pick;
+use crate::picking::{self, Pick};
 
 /// Stated errors at refinement 1 between which the weight of further passes rises from 0 to 1. The whole
 /// error decides about the plain grade and about wider bands of quick and plain passes; of a bone that
@@ -25,8 +25,8 @@ const SMALL: (f64, f64) = (0.01, 0.015);
 /// Time from the first to the last pick, in periods, of the usual array: in a shorter one the same error
 /// of a time is a larger one of the velocity.
 const USUAL_ARRAY: f64 = 2.5;
-/// Delays of a pick after the earliest possible arrival, in periods of the centre frequency,
-/// between which the weight of the thorough passes rises: a quick sampling has room for packets up to
+/// Delays of a pick of the paper's pulse after the earliest possible arrival, in periods of the centre
+/// frequency, between which the weight of the thorough passes rises: a quick sampling has room for packets up to
 /// [`sampling::QUICK_LATEST`].
 const LATE: (f64, f64) = (1.2, 1.3);
 /// Times from a pick to the direct wave, in periods, between which that weight falls.
@@ -100,9 +100,9 @@ pub(super) fn unreliable_pick_weight(
         delay = delay.max(t - sampling::earliest_arrival(&prepared.setup, place, speed));
         margin = margin.min(sampling::direct_arrival(&prepared.setup, place) - t);
     }
-    let ratio = found.pick.ratio / prepared.setup.picking.threshold;
-    let skipped = found.pick.skipped / prepared.setup.picking.threshold;
-    rise(delay * fc, LATE)
+    let threshold = picking::criterion(&prepared.setup).threshold;
+    let (ratio, skipped) = (found.pick.ratio / threshold, found.pick.skipped / threshold);
+    rise(delay * fc - prepared.setup.probe.pulse.delay(), LATE)
         .max(rise(found.pick.residual * fc, OFF_LINE))
         .max(rise(skipped, NEARLY_PICKED))
         .max(1.0 - rise(margin * fc, NEAR_DIRECT_WAVE))

@@ -12,8 +12,6 @@
 //! two is heard at a receiver, so that the picked pressure is that of the bone's motion alone. The
 //! fluid's outer face adds images of the source where their waves, by way of the bone, can be heard.
 
-use std::f64::consts::PI;
-
 use osteon_common::case::Setup;
 
 use super::mesh::longest_coupling_path;
@@ -21,8 +19,6 @@ use super::scope::Scope;
 use crate::lanes::{LANES, Lanes};
 use crate::pulse::Pulse;
 
-/// Pulses are cut where they are below 1e-10 of their amplitude.
-const PULSE_PERIODS: f64 = 3.4;
 /// Points of interpolation between samples.
 const POINTS: usize = 6;
 /// Maximum number of images of the source. A fluid thinner than about 1/64 of the longest path on which a
@@ -74,10 +70,9 @@ pub(super) struct Incident {
 impl Incident {
     /// Creates the load for samples `step` (s) apart.
     pub(super) fn new(setup: &Setup, scope: &Scope, step: f64) -> Self {
-        let fc = setup.probe.center_frequency;
-        let samples = (PULSE_PERIODS / fc / step) as usize + 1;
         // A velocity does not depend on the pulse's amplitude, not even in its last bit.
-        let pulse = Pulse::new(1.0, fc);
+        let pulse = Pulse::new(1.0, &setup.probe);
+        let samples = (pulse.extent() / step) as usize + 1;
         let at = |i: usize| i as f64 * step;
         Self {
             images: images(setup, scope),
@@ -85,7 +80,7 @@ impl Incident {
             density: setup.layers.coupling.density,
             step,
             pulse: (0..samples).map(|i| pulse.at(at(i))).collect(),
-            pulse_slope: (0..samples).map(|i| pulse_slope(fc, at(i))).collect(),
+            pulse_slope: (0..samples).map(|i| pulse.slope_at(at(i))).collect(),
             kernel: Vec::new(),
             table: Vec::new(),
         }
@@ -165,14 +160,6 @@ fn convolve(pulse: &[f64], kernel: &[Lanes]) -> Lanes {
         i += 1;
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3])
-}
-
-/// Returns F'(t) of amplitude 1, t ≥ 0.
-fn pulse_slope(center_frequency: f64, t: f64) -> f64 {
-    let (sin, cos) = libm::sincos(2.0 * PI * center_frequency * t);
-    let from_center = center_frequency * t - 1.0;
-    let envelope = libm::exp(-4.0 * from_center * from_center);
-    center_frequency * envelope * (2.0 * PI * cos - 8.0 * from_center * sin)
 }
 
 /// Adds to `sum` the table's value at `position` > 0, counted in samples; before the first there

@@ -55,9 +55,9 @@ impl LayerMesh {
 impl Mesh {
     /// Creates the mesh for `scope`, with elements `finer` times smaller than in the setup.
     pub(super) fn new(setup: &Setup, bone: &Sublayers, scope: &Scope, finer: f64) -> Self {
-        let fc = setup.probe.center_frequency;
+        let frequency = setup.probe.band_unit();
         let size = |slowest: f64| {
-            let share = (slowest / fc / WAVELENGTH).min(1.0);
+            let share = (slowest / frequency / WAVELENGTH).min(1.0);
             setup.solver.element_size * share / finer
         };
         let fluids =

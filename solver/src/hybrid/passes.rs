@@ -13,7 +13,7 @@ use super::scope::{Scope, Span};
 use crate::arrival::Arrival;
 use crate::failure::{Failure, pressure_not_finite};
 use crate::isa::Isa;
-use crate::picking::{FLOOR, Pick, Window, pick};
+use crate::picking::{FLOOR, Pick, Window, criterion, pick};
 
 /// Fineness of the first pass, relative to the setup. In a thin plate all passes are finer, by the
 /// square root of the thinness.
@@ -281,7 +281,7 @@ impl Passes<'_> {
             }
         }
         let fc = self.setup.probe.center_frequency;
-        let pick = pick(&self.setup.picking, fc, self.distances, self.windows)?;
+        let pick = pick(&criterion(self.setup), fc, self.distances, self.windows)?;
         Ok((pick, floors))
     }
 }

@@ -55,6 +55,8 @@ pub(super) struct Plan {
     pub(super) band: f64,
     /// End of the last window, s.
     pub(super) end: f64,
+    /// Width of source and receivers, m.
+    element_width: f64,
 }
 
 /// Times of one computation.
@@ -128,7 +130,7 @@ impl Plan {
         let length =
             farthest + scope.speed * (end - earliest_arrival(setup, above, scope.speed)) + heights;
         let sound_speed = setup.layers.coupling.sound_speed;
-        let propagating = 2.0 * PI * BAND * setup.probe.center_frequency / sound_speed;
+        let propagating = 2.0 * PI * BAND * setup.probe.band_unit() / sound_speed;
         let evanescent = EVANESCENCE / heights;
         let spacing = mesh.coupling.size / (mesh.element.count() - 1) as f64;
         Ok(Self {
@@ -138,6 +140,7 @@ impl Plan {
             wavenumber_limit: wavenumber_fineness(setup, finer)
                 * propagating.mul_add(propagating, evanescent * evanescent).sqrt(),
             end,
+            element_width: setup.probe.element_width,
         })
     }
 
@@ -150,7 +153,14 @@ impl Plan {
     pub(super) fn weight(&self, k: f64) -> f64 {
         let taper = smooth_step((1.0 - k / self.wavenumber_limit) / (1.0 - TAPER_START));
         let half = if k == 0.0 { 0.5 } else { 1.0 };
-        half * taper * self.wavenumber_step / PI
+        half * taper * self.wavenumber_step / PI * self.element_factor(k)
+    }
+
+    /// Returns the mean of e^(ikx) over the width of the source, times that over a receiver's.
+    fn element_factor(&self, k: f64) -> f64 {
+        let phase = 0.5 * k * self.element_width;
+        let mean = if phase == 0.0 { 1.0 } else { libm::sin(phase) / phase };
+        mean * mean
     }
 
     /// Returns the times from `onset` (s) on, with steps of `share` of the largest stable one,
@@ -177,8 +187,7 @@ impl Plan {
             )));
         }
         budget.take(work)?;
-        let rate =
-            (SAMPLES_PER_PERIOD * setup.probe.center_frequency).max(BAND_SAMPLES * self.band);
+        let rate = (SAMPLES_PER_PERIOD * setup.probe.band_unit()).max(BAND_SAMPLES * self.band);
         let spacing = 1.0 / rate;
         let ratio = ((spacing / step) as usize).max(1);
         let mut times = Times { step, ratio, samples: 0 };

@@ -11,6 +11,8 @@ pub(super) struct Scope {
     pub(super) speed: f64,
     /// One window per receiver.
     pub(super) windows: Vec<Span>,
+    /// Width of source and receivers, m.
+    element_width: f64,
 }
 
 /// The window of one receiver.
@@ -32,7 +34,8 @@ impl Scope {
             from: earliest_arrival(setup, place, speed),
             to: direct_arrival(setup, place),
         };
-        Self { speed, windows: setup.probe.places().map(span).collect() }
+        let windows = setup.probe.places().map(span).collect();
+        Self { speed, windows, element_width: setup.probe.element_width }
     }
 
     /// Returns windows that end at most `after` (s) after each of `times` (s), one per receiver.
@@ -56,7 +59,7 @@ impl Scope {
     /// Returns the longest time, s, that a wave can spend across layers and still arrive in a
     /// window.
     pub(super) fn longest_time_across(&self) -> f64 {
-        let time_across = |span: &Span| span.to - span.distance / self.speed;
+        let time_across = |span: &Span| span.to - (span.distance - self.element_width) / self.speed;
         self.windows.iter().map(time_across).fold(0.0, f64::max)
     }
 }

@@ -9,6 +9,7 @@ use osteon_common::moments::Moments;
 use osteon_common::parameters::extended;
 use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
 use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
+use osteon_common::pulse::{PulseForm, PulseShape};
 use osteon_common::random_quantities::{RandomDistribution, Scatter};
 use osteon_common::settings::{Method, SolverSettings};
 use proptest::prelude::*;
@@ -174,6 +175,11 @@ fn layered() -> impl Strategy<Value = Setup> {
         setup.solver.refinement = refinement;
         setup.layers.bone_attenuation.quality_factor = quality;
         (setup.probe.tilt, setup.probe.bidirectional) = (-0.02 * refinement, quality.is_some());
+        setup.probe.element_width = 1e-4 * refinement;
+        setup.probe.pulse = match quality {
+            Some(_) => PulseForm { shape: PulseShape::Tone, cycles: 4.0 * refinement },
+            None => PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() },
+        };
         setup
     });
     let hybrid = (1e-4..1e-3, 2_u32..=12, proptest::option::of(1e-9..1e-7)).prop_map(
