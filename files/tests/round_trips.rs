@@ -1,6 +1,9 @@
 //! What is written reads back to the same bits; what is read never panics; a specification is
 //! judged alike whether it comes as a file or not.
 
+#[path = "support/fluids.rs"]
+mod fluids;
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -22,29 +25,17 @@ use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
+use osteon_common::setup_quantity::SetupQuantity;
 use osteon_files::document::Format;
 use osteon_files::file_error::ContentError;
 use osteon_files::{case_file, job_file};
 use osteon_fuzz::properties;
 use proptest::prelude::*;
 
+use fluids::{fluid, positive};
+
 const FORMATS: [Format; 2] = [Format::Toml, Format::Json];
 const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
-
-/// Any positive normal or subnormal number.
-fn positive() -> impl Strategy<Value = f64> {
-    use proptest::num::f64::{NORMAL, POSITIVE, SUBNORMAL};
-    POSITIVE | NORMAL | SUBNORMAL
-}
-
-fn fluid() -> impl Strategy<Value = Fluid> {
-    (4e-3..30e-3, positive(), 1200.0..1800.0).prop_map(|(thickness, density, sound_speed)| Fluid {
-        thickness,
-        density,
-        sound_speed,
-        attenuation: Attenuation::default(),
-    })
-}
 
 fn attenuation() -> impl Strategy<Value = Attenuation> {
     prop::option::of((2.0..1e3, 0.2e6..5e6)).prop_map(|given| match given {
@@ -233,7 +224,10 @@ fn scattered(
         bone_thickness: scatter(thickness, setup.layers.bone_thickness),
         // The smallest that is accepted is 2.
         bone_quality_factor: scatter(quality, quality_factor.map_or(0.0, |mean| mean - 2.0)),
-        coupling_sound_speed: scatter(speed, setup.layers.coupling.sound_speed),
+        coupling_sound_speed: scatter(
+            speed,
+            SetupQuantity::CouplingSoundSpeed.value_in(setup).unwrap_or(0.0),
+        ),
         probe_tilt: scatter(tilt, setup.probe.tilt),
     }
 }
@@ -367,9 +361,9 @@ fn change_prior(job: &mut JobSpecification, prior: PosteriorPrior) {
 }
 
 const EDITS: [Edit; 20] = [
-    |job, x| job.setup.layers.coupling.thickness = x,
+    |job, x| job.setup.layers.coupling = Fluid { thickness: x, ..Layers::default().coupling },
     |job, x| job.setup.layers.bone_thickness = x,
-    |job, x| job.setup.layers.marrow.sound_speed = x,
+    |job, x| job.setup.layers.marrow = Fluid { sound_speed: x, ..Layers::default().marrow },
     |job, x| job.setup.probe.center_frequency = x,
     |job, x| job.setup.probe.source.x1 = x,
     |job, x| job.setup.probe.source.x3 = x,

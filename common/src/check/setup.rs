@@ -31,8 +31,8 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
 
 /// Checks that source and receivers lie inside fluid 1: 0 < x3 < h1.
 fn heights(setup: &Setup, violations: &mut Violations) {
-    let top = setup.layers.coupling.thickness;
-    let accepted = if known_wrong("layers.coupling.thickness", violations) {
+    let top = setup.layers.coupling.whole_thickness();
+    let accepted = if violations.has_at_or_below("layers.coupling") {
         Interval::above(0.0, "m")
     } else {
         Interval::between(0.0, top, "m, inside the coupling layer")
@@ -95,13 +95,12 @@ fn one_side(probe: &Probe, violations: &mut Violations) {
 /// Checks that a tilted probe remains inside fluid 1, and in front of its source.
 fn tilted(setup: &Setup, violations: &mut Violations) {
     let probe = &setup.probe;
-    let known_wrong = ["probe", "layers.coupling.thickness"]
-        .iter()
-        .any(|field| violations.has_at_or_below(field));
+    let known_wrong =
+        ["probe", "layers.coupling"].iter().any(|field| violations.has_at_or_below(field));
     if known_wrong || probe.tilt == 0.0 {
         return;
     }
-    let top = setup.layers.coupling.thickness;
+    let top = setup.layers.coupling.whole_thickness();
     let other_side = probe.bidirectional.then(|| probe.from_other_side());
     for probe in [*probe].into_iter().chain(other_side) {
         let heights = || probe.places().map(|place| place.x3).chain([probe.source.x3]);

@@ -1,20 +1,29 @@
 //! Earliest possible arrivals: bounds from geometry and the fastest wave.
 
+use crate::attenuation::Attenuation;
 use crate::case::Setup;
-use crate::layers::Fluid;
+use crate::fluid_sublayers::FluidSublayers;
 use crate::probe::Place;
+
+use super::fluid_path::{FluidPath, earliest_in_fluids, slowness};
 
 /// Returns the highest speed, m/s, of waves along the bone, in which none is faster than `in_bone` (m/s)
 /// at the reference frequency of its attenuation.
 pub fn fastest(setup: &Setup, in_bone: f64) -> f64 {
     let attenuation = &setup.layers.bone_attenuation;
     let in_bone = in_bone * attenuation.fastest(setup.probe.center_frequency);
-    in_bone.max(fastest_in(&setup.layers.marrow, setup))
+    let marrow = &setup.layers.marrow;
+    in_bone.max(fastest_in(&setup.layers.marrow_fluids(), &marrow.attenuation, setup))
 }
 
-/// Returns the highest speed, m/s, of waves in a fluid of the setup.
-pub fn fastest_in(fluid: &Fluid, setup: &Setup) -> f64 {
-    fluid.sound_speed * fluid.attenuation.fastest(setup.probe.center_frequency)
+/// Returns the highest speed, m/s, of waves in the coupling.
+pub fn fastest_in_coupling(setup: &Setup) -> f64 {
+    let coupling = &setup.layers.coupling;
+    fastest_in(&setup.layers.coupling_fluids(), &coupling.attenuation, setup)
+}
+
+fn fastest_in(fluids: &FluidSublayers, attenuation: &Attenuation, setup: &Setup) -> f64 {
+    fluids.fastest() * attenuation.fastest(setup.probe.center_frequency)
 }
 
 /// Returns the earliest possible arrival, s, at a receiver's place of a wave that travels along the
@@ -22,12 +31,24 @@ pub fn fastest_in(fluid: &Fluid, setup: &Setup) -> f64 {
 ///
 /// It is a lower bound at every distance: within the critical one the reflected wave arrives later.
 pub fn earliest_arrival(setup: &Setup, place: Place, speed: f64) -> f64 {
-    let c1 = setup.layers.coupling.sound_speed;
-    let heights = place.x3 + setup.probe.source.x3;
-    if speed <= c1 {
-        return reflected_arrival(setup, place);
+    let fluids = setup.layers.coupling_fluids();
+    let path = FluidPath::by_the_bone(&fluids, setup.probe.source.x3, place.x3);
+    match fluids.as_slice() {
+        [one] if speed <= one.sound_speed => path.ray(place.x),
+        _ => {
+            let speed = fastest_way(&fluids, speed);
+            place.x / speed + path.delay(speed)
+        }
     }
-    place.x / speed + heights * slowness(c1, speed)
+}
+
+/// Returns the highest speed along x1, m/s, of what may run in the fluids on its way, too, and else at up to
+/// `speed` (m/s). One fluid is no way: what runs in it meets the bone in vain.
+fn fastest_way(fluids: &FluidSublayers, speed: f64) -> f64 {
+    match fluids.as_slice() {
+        [_] => speed,
+        _ => speed.max(fluids.fastest()),
+    }
 }
 
 /// Returns the earliest possible arrival, s, at a receiver's place of a reflection of an outer face, for
@@ -42,10 +63,18 @@ pub fn echoes_are_audible(setup: &Setup, speed: f64) -> bool {
     is_audible(setup, speed, earliest_echo)
 }
 
-/// Returns the arrival, s, of the direct wave in the coupling fluid at a receiver's place.
+/// Returns the arrival, s, of the direct wave in the coupling fluid at a receiver's place; in sublayers, of
+/// the first wave that does not meet the bone.
 pub fn direct_arrival(setup: &Setup, place: Place) -> f64 {
-    let (x, across) = (place.x, place.x3 - setup.probe.source.x3);
-    x.mul_add(x, across * across).sqrt() / setup.layers.coupling.sound_speed
+    let fluids = setup.layers.coupling_fluids();
+    let (source, x) = (setup.probe.source.x3, place.x);
+    match fluids.as_slice() {
+        [one] => {
+            let across = place.x3 - source;
+            x.mul_add(x, across * across).sqrt() / one.sound_speed
+        }
+        _ => earliest_in_fluids(&fluids, source, place.x3, x),
+    }
 }
 
 /// Returns the smallest and the largest distance of a receiver from the source along the bone, m.
@@ -56,10 +85,10 @@ pub fn nearest_and_farthest(setup: &Setup) -> (f64, f64) {
     setup.probe.places().fold((f64::INFINITY, 0.0), of)
 }
 
-/// Returns √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at
-/// `v`.
-pub fn slowness(c: f64, v: f64) -> f64 {
-    (1.0 / (c * c) - 1.0 / (v * v)).max(0.0).sqrt()
+/// Returns the path from the source by way of the bone to the lowest receiver.
+pub(super) fn by_the_bone(setup: &Setup) -> FluidPath {
+    let fluids = setup.layers.coupling_fluids();
+    FluidPath::by_the_bone(&fluids, setup.probe.source.x3, setup.probe.lowest_receiver())
 }
 
 /// Returns whether what arrives at the time that `echo` gives is before the direct wave at some receiver.
@@ -69,20 +98,24 @@ pub(super) fn is_audible(setup: &Setup, speed: f64, echo: fn(&Setup, Place, f64)
 
 /// Returns the arrival, s, at a receiver's place of the wave reflected by the bone's upper face.
 pub(super) fn reflected_arrival(setup: &Setup, place: Place) -> f64 {
-    let (x, heights) = (place.x, place.x3 + setup.probe.source.x3);
-    x.mul_add(x, heights * heights).sqrt() / setup.layers.coupling.sound_speed
+    let fluids = setup.layers.coupling_fluids();
+    FluidPath::by_the_bone(&fluids, setup.probe.source.x3, place.x3).ray(place.x)
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the coupling's outer face.
 pub(super) fn upper_echo(setup: &Setup, place: Place, speed: f64) -> f64 {
-    let coupling = &setup.layers.coupling;
-    let path = 2.0 * coupling.thickness - (place.x3 - setup.probe.source.x3).abs();
-    place.x / speed + path * slowness(coupling.sound_speed, speed)
+    let fluids = setup.layers.coupling_fluids();
+    let path = FluidPath::by_the_outer_face(&fluids, setup.probe.source.x3, place.x3);
+    let speed = fastest_way(&fluids, speed);
+    place.x / speed + path.delay(speed)
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the marrow's outer face.
 pub(super) fn lower_echo(setup: &Setup, place: Place, speed: f64) -> f64 {
-    let marrow = &setup.layers.marrow;
-    let across = 2.0 * marrow.thickness * slowness(marrow.sound_speed, speed);
+    let fluids = setup.layers.marrow_fluids();
+    let across = fluids
+        .as_slice()
+        .iter()
+        .fold(0.0, |sum, fluid| sum + 2.0 * fluid.thickness * slowness(fluid.sound_speed, speed));
     earliest_arrival(setup, place, speed) + across
 }
