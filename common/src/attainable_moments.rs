@@ -259,7 +259,8 @@ fn apparent(setup: &Setup, velocity: f64) -> f64 {
         return velocity;
     }
     let (sin, cos) = libm::sincos(probe.tilt);
-    let across = sampling::slowness(setup.layers.coupling.sound_speed, velocity);
+    let fluid = setup.layers.coupling_fluids().at(probe.receivers.x3);
+    let across = fluid.map_or(0.0, |fluid| sampling::slowness(fluid.sound_speed, velocity));
     let across = if probe.bidirectional { 0.0 } else { sin * across };
     let slowness = cos / velocity + across;
     if slowness > 0.0 { 1.0 / slowness } else { f64::INFINITY }

@@ -10,15 +10,16 @@ use crate::parameters::Point;
 const MARGIN: f64 = 10.0;
 
 /// Returns the velocities, m/s, that realizations of a point can have: from a tenth of the speed of sound in
-/// the slower fluid to ten times an upper bound on the speeds in the mean bone (the square root of the trace
+/// the slowest fluid to ten times an upper bound on the speeds in the mean bone (the square root of the trace
 /// of its elasticity over its density) and in the fluids. `None` if the mean elasticity is inadmissible, so
 /// that there are no realizations.
 pub fn carried_velocities(layers: &Layers, point: &Point) -> Option<RangeInclusive<f64>> {
     let elasticity = point.constants().elasticity().ok()?;
     let trace: f64 = (0..6).map(|i| elasticity.rows()[i][i]).sum();
     let bone = (trace / point.density()).sqrt();
-    let (above, below) = (layers.coupling.sound_speed, layers.marrow.sound_speed);
-    Some(above.min(below) / MARGIN..=bone.max(above).max(below) * MARGIN)
+    let fluids = [layers.coupling_fluids(), layers.marrow_fluids()];
+    let speeds = || fluids.iter().flat_map(|all| all.as_slice()).map(|fluid| fluid.sound_speed);
+    Some(speeds().fold(f64::INFINITY, f64::min) / MARGIN..=speeds().fold(bone, f64::max) * MARGIN)
 }
 
 #[cfg(test)]

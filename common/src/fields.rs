@@ -52,6 +52,9 @@ pub trait Fields {
     /// Declares a table with keys of its own. `declare` may be called several times.
     fn table(&mut self, key: Key, declare: &mut dyn FnMut(&mut dyn Fields));
 
+    /// Declares a list of tables.
+    fn list(&mut self, key: Key, field: &mut dyn List);
+
     /// Declares keys that are meaningful only under a condition on an earlier key.
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields));
 
@@ -129,6 +132,30 @@ impl Whole for u32 {
     fn set(&mut self, value: u64) {
         *self = Self::try_from(value).unwrap_or(Self::MAX);
     }
+}
+
+/// A list of tables that may be empty, and is by default. In a file, every number of an element must be
+/// given.
+pub trait List {
+    /// Returns the number of elements.
+    fn len(&self) -> usize;
+
+    /// Returns whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Returns the largest number of elements.
+    fn max(&self) -> usize;
+
+    /// Sets the number of elements, at most the largest, before the new ones are set.
+    fn resize(&mut self, len: usize);
+
+    /// Returns the element at `index`, which is less than the number of elements.
+    fn element(&mut self, index: usize) -> &mut dyn Section;
+
+    /// Returns an element that has the keys of all, and any values.
+    fn example(&self) -> Box<dyn Section>;
 }
 
 /// A value of a closed set, each with a name.

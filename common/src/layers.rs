@@ -1,12 +1,17 @@
 //! The three layers: coupling fluid, cortical bone, marrow.
 
 use crate::attenuation::Attenuation;
-use crate::fields::{Fields, Key, Number, Section};
+use crate::fields::{Condition, Fields, Key, Number, Section};
+use crate::fluid_sublayers::{FluidSublayer, FluidSublayers};
 use crate::plausible::{BONE_THICKNESS, FLUID_DENSITY, FLUID_THICKNESS, SOUND_SPEED};
 
-/// A fluid layer, unbounded along x1 and x2.
+/// A fluid layer, unbounded along x1 and x2: one fluid, or sublayers of different ones.
+/// [`Layers::coupling_fluids`] and [`Layers::marrow_fluids`] return the fluids of either.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fluid {
+    /// Sublayers from the skin's side to the marrow's; if there are any, the next three have their
+    /// defaults and no meaning.
+    pub sublayers: FluidSublayers,
     /// Thickness, m (h1 of the coupling fluid, h2 of the marrow).
     pub thickness: f64,
     /// Mass density, kg/m³.
@@ -37,6 +42,7 @@ impl Default for Layers {
     /// water-like.
     fn default() -> Self {
         let water = Fluid {
+            sublayers: FluidSublayers::NONE,
             thickness: 10e-3,
             density: 1000.0,
             sound_speed: 1500.0,
@@ -52,6 +58,16 @@ impl Default for Layers {
 }
 
 impl Layers {
+    /// Returns the fluids above the bone, upwards from its face; no two neighbours are the same.
+    pub fn coupling_fluids(&self) -> FluidSublayers {
+        self.coupling.fluids().reversed()
+    }
+
+    /// Returns the fluids below the bone, downwards from its face; no two neighbours are the same.
+    pub fn marrow_fluids(&self) -> FluidSublayers {
+        self.marrow.fluids()
+    }
+
     /// Returns the path, in a file, of the attenuation of the first layer that has one.
     pub fn attenuated(&self) -> Option<&'static str> {
         let layers = [
@@ -82,23 +98,56 @@ impl Section for Layers {
     }
 }
 
+impl Fluid {
+    /// Returns the speed of sound, m/s, of the fastest fluid in the layer.
+    pub fn fastest(&self) -> f64 {
+        self.fluids().fastest()
+    }
+
+    /// Returns the thickness of the whole layer, m.
+    pub fn whole_thickness(&self) -> f64 {
+        self.fluids().thickness()
+    }
+
+    /// Returns the fluids of the layer, downwards; no two neighbours are the same.
+    fn fluids(&self) -> FluidSublayers {
+        if !self.sublayers.is_empty() {
+            return self.sublayers.merged();
+        }
+        let Self { thickness, density, sound_speed, .. } = *self;
+        FluidSublayers::of_one(FluidSublayer { thickness, density, sound_speed })
+    }
+}
+
 impl Section for Fluid {
     fn declare(&mut self, fields: &mut dyn Fields) {
-        fields.number(
-            Key { name: "thickness", meaning: "thickness of the layer" },
-            &mut self.thickness,
-            Number::above_zero(&FLUID_THICKNESS),
-        );
-        fields.number(
-            Key { name: "density", meaning: "mass density" },
-            &mut self.density,
-            Number::above_zero(&FLUID_DENSITY),
-        );
-        fields.number(
-            Key { name: "sound_speed", meaning: "speed of sound" },
-            &mut self.sound_speed,
-            Number::above_zero(&SOUND_SPEED),
-        );
+        let meaning = "sublayers of different fluids, from the skin's side to the marrow's, in place of one fluid";
+        fields.list(Key { name: "sublayers", meaning }, &mut self.sublayers);
+        let condition = Condition {
+            holds: self.sublayers.is_empty(),
+            decided_by: "sublayers",
+            description: "without `sublayers`",
+            refusal:
+                "is given together with sublayers, each of which has its own; leave one of them out"
+                    .to_owned(),
+        };
+        fields.only_if(&condition, &mut |fields| {
+            fields.number(
+                Key { name: "thickness", meaning: "thickness of the layer" },
+                &mut self.thickness,
+                Number::above_zero(&FLUID_THICKNESS),
+            );
+            fields.number(
+                Key { name: "density", meaning: "mass density" },
+                &mut self.density,
+                Number::above_zero(&FLUID_DENSITY),
+            );
+            fields.number(
+                Key { name: "sound_speed", meaning: "speed of sound" },
+                &mut self.sound_speed,
+                Number::above_zero(&SOUND_SPEED),
+            );
+        });
         let key = Key { name: "attenuation", meaning: "attenuation of sound in the fluid" };
         fields.table(key, &mut |fields| self.attenuation.declare(fields));
     }

@@ -29,6 +29,7 @@ pub mod elasticity;
 pub mod ensemble;
 pub mod field_path;
 pub mod fields;
+pub mod fluid_sublayers;
 pub mod germ_source;
 pub mod homogenisation;
 pub mod inference;

@@ -9,6 +9,8 @@ pub const RECEIVERS_MIN: u32 = 3;
 pub const RECEIVERS_MAX: u32 = 64;
 /// Maximum number of solid sublayers of a bone.
 pub const SUBLAYERS_MAX: usize = 16;
+/// Maximum number of sublayers of a fluid.
+pub const FLUID_SUBLAYERS_MAX: usize = 4;
 /// Minimum thickness of a sublayer, m: that of one thinner than a lamella of bone loses digits.
 pub const SUBLAYER_THICKNESS_MIN: f64 = 1e-6;
 /// Maximum number of realizations of one evaluation.

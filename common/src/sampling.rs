@@ -20,20 +20,25 @@
 //! suffice there, too, so those of the later, slower waves are faded out smoothly.
 
 mod arrivals;
+mod crowding;
+mod fluid_path;
 mod thinning;
 
 use std::f64::consts::PI;
 
 use crate::case::Setup;
+use crate::layers::Layers;
 use crate::limits::SAMPLING_PAIRS_MAX;
 use crate::probe::Place;
 use crate::settings::Method;
-use arrivals::{is_audible, last_reflected_arrival, lower_echo, upper_echo};
+use arrivals::{by_the_bone, is_audible, last_reflected_arrival, lower_echo, upper_echo};
+use crowding::{SLOWNESS_FADE, SLOWNESS_START, crowding};
 
 pub use arrivals::{
-    direct_arrival, earliest_arrival, earliest_echo, echoes_are_audible, fastest, fastest_in,
-    nearest_and_farthest, slowness,
+    direct_arrival, earliest_arrival, earliest_echo, echoes_are_audible, fastest,
+    fastest_in_coupling, nearest_and_farthest,
 };
+pub use fluid_path::slowness;
 pub use thinning::{FrequencyRun, RUN, smooth_step};
 
 /// Ratio of the upper edges of neighbouring speed bins.
@@ -97,14 +102,6 @@ const TRACE_MARGIN: f64 = 1.15;
 /// Frequencies, as multiples of the centre frequency, between which the sum over wavenumbers
 /// narrows from all waves to those of the first packet.
 const SLOW_WAVES_END: (f64, f64) = (3.5, 4.0);
-/// Slowness at which waves begin to be left out, as a multiple of that of the fastest wave.
-const SLOWNESS_START: f64 = 0.8;
-/// Range of slowness over which they fade, as a fraction of that of the coupling fluid.
-const SLOWNESS_FADE: f64 = 0.5;
-/// Minimum separation, at the nearest receiver, of the waves at the two ends of the fading, in
-/// periods of the centre frequency, for frequencies to be thinned and slow waves to be left out
-/// from their usual place on; if the separation is smaller, this happens higher in the band.
-const APART: f64 = 2.2;
 
 /// Grade of a sampling: the kind of bone for which it suffices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,7 +145,7 @@ pub struct WaveSampling {
     pub bands: [f64; BANDS],
     /// Δk, rad/m.
     pub wavenumber_step: f64,
-    /// √(k² - (ω/c1)²) at which the sum over wavenumbers ends, rad/m.
+    /// √(k² - (ω/c1)²), with the slowest c1 that is crossed, at which the sum over wavenumbers ends, rad/m.
     pub evanescent_limit: f64,
     /// Whether reflections of the coupling's outer face can arrive inside a window.
     pub upper_echoes: bool,
@@ -162,7 +159,8 @@ pub struct WaveSampling {
 
 /// Returns the quick sampling of a setup at the usual speeds of bone.
 pub fn nominal(setup: &Setup) -> WaveSampling {
-    let fluids = setup.layers.coupling.sound_speed.max(setup.layers.marrow.sound_speed);
+    let Layers { coupling, marrow, .. } = &setup.layers;
+    let fluids = coupling.fastest().max(marrow.fastest());
     let speed = fastest(setup, NOMINAL_SPEED).max(1.2 * fluids);
     let bin = speed_bin(setup, speed).unwrap_or(SPEED_BINS - 1);
     WaveSampling::for_speed_bin(setup, bin, first_grade(setup), OuterFaces::None)
@@ -290,7 +288,6 @@ impl WaveSampling {
 
     fn new(setup: &Setup, grade: Grade, damping: f64, speed: f64, period: f64, last: f64) -> Self {
         let refinement = setup.solver.refinement;
-        let coupling = &setup.layers.coupling;
         let lowest = setup.probe.lowest_receiver();
         let (_, upwards) = setup.probe.element_extent();
         let heights = lowest + setup.probe.source.x3 - upwards.abs();
@@ -326,7 +323,7 @@ impl WaveSampling {
             evanescent_limit: (damping + evanescence) / heights,
             upper_echoes: false,
             lower_echoes: false,
-            sound_speed: coupling.sound_speed,
+            sound_speed: by_the_bone(setup).slowest(),
             unit: unit * band_unit,
         }
     }
@@ -451,25 +448,6 @@ pub fn trace_taper(band: f64) -> (f64, f64) {
     (TRACE_TAPER_START * band, band)
 }
 
-/// Returns how much higher in the band than usual the first packet separates from slower waves, at
-/// the nearest receiver: below that, the signals of both would overlap if they were cut off sharply
-/// in time and slowness.
-fn crowding(setup: &Setup, speed: f64) -> f64 {
-    let c1 = setup.layers.coupling.sound_speed;
-    let start = SLOWNESS_START * c1 / speed;
-    let end = start + SLOWNESS_FADE;
-    if end >= 1.0 {
-        return 1.0;
-    }
-    let heights = setup.probe.lowest_receiver() + setup.probe.source.x3;
-    let (nearest, _) = nearest_and_farthest(setup);
-    // Slowness relative to that of the fluid, along and across.
-    let across = |along: f64| (1.0 - along * along).sqrt();
-    let apart = nearest * (end - start) - heights * (across(start) - across(end));
-    let periods = apart / c1 * setup.probe.center_frequency;
-    if periods > 0.0 { (APART / periods).max(1.0) } else { f64::INFINITY }
-}
-
 /// Returns how much wider the band must be than that of a thick plate.
 pub fn thinness(setup: &Setup) -> f64 {
     let product = setup.layers.bone_thickness * setup.probe.center_frequency;
@@ -478,7 +456,7 @@ pub fn thinness(setup: &Setup) -> f64 {
 
 /// Speed of the lowest speed bin, m/s: waves no faster than the coupling fluid never arrive first.
 fn first_bin_edge(setup: &Setup) -> f64 {
-    setup.layers.coupling.sound_speed * SPEED_BIN_RATIO
+    setup.layers.coupling.fastest() * SPEED_BIN_RATIO
 }
 
 /// Returns α T.

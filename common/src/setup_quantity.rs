@@ -83,11 +83,22 @@ impl SetupQuantity {
         match self {
             Self::BoneThickness => Some(setup.layers.bone_thickness),
             Self::BoneQualityFactor => setup.layers.bone_attenuation.quality_factor,
-            Self::CouplingSoundSpeed => Some(setup.layers.coupling.sound_speed),
+            Self::CouplingSoundSpeed => {
+                let coupling = &setup.layers.coupling;
+                coupling.sublayers.is_empty().then_some(coupling.sound_speed)
+            }
             Self::ProbeTilt => Some(setup.probe.tilt),
             Self::Porosity => setup.pores.porosity,
             Self::SurfacePorosity => setup.pores.profile.surface,
             Self::MarrowPorosity => setup.pores.profile.marrow,
+        }
+    }
+
+    /// Returns what a message says of the key of the mean if the setup has none.
+    pub(crate) fn lacking(self) -> &'static str {
+        match self {
+            Self::CouplingSoundSpeed => "is that of each of its sublayers; leave one of them out",
+            _ => "is not given; give both",
         }
     }
 

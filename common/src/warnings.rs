@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::case::{Bone, Case, Setup};
-use crate::field_path::entry_path;
+use crate::field_path::{element_path, entry_path};
 use crate::fields::{self, DeclaredKey, DeclaredValue, Number};
 use crate::job::{Data, JobSpecification, Measurements, Range};
 use crate::moments::Outlier;
@@ -129,6 +129,11 @@ impl Warnings {
                     self.number(&field, *value, range);
                 }
                 DeclaredValue::Table(entries) => self.entries(&field, entries),
+                DeclaredValue::List { elements, .. } => {
+                    for (index, entries) in elements.iter().enumerate() {
+                        self.entries(&element_path(&field, index), entries);
+                    }
+                }
                 _ => {}
             }
         }

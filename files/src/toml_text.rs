@@ -136,6 +136,11 @@ pub(crate) fn value(value: &DeclaredValue) -> Option<String> {
         DeclaredValue::Boolean(truth) => truth.to_string(),
         DeclaredValue::Choice { chosen, .. } => format!("\"{chosen}\""),
         DeclaredValue::Table(entries) => return inline_table(entries),
+        DeclaredValue::List { elements, .. } if elements.is_empty() => return None,
+        DeclaredValue::List { elements, .. } => {
+            let elements = elements.iter().filter_map(|entries| inline_table(entries));
+            format!("[{}]", elements.collect::<Vec<_>>().join(", "))
+        }
         DeclaredValue::CustomTable => return None,
     })
 }
@@ -160,6 +165,9 @@ fn units_of(value: &DeclaredValue, units: &mut Vec<&'static str>) {
         DeclaredValue::Table(entries) => {
             let entries = entries.iter().filter(|entry| entry.applies());
             entries.for_each(|entry| units_of(&entry.value, units));
+        }
+        DeclaredValue::List { elements, .. } => {
+            elements.iter().flatten().for_each(|entry| units_of(&entry.value, units));
         }
         _ => {}
     }

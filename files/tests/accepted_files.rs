@@ -11,6 +11,7 @@ use osteon_common::attenuation::Attenuation;
 use osteon_common::bone::{Bone, CaseBone};
 use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::EngineeringConstants;
+use osteon_common::fluid_sublayers::FluidSublayers;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorPrior, PosteriorSettings,
     Range, Search,
@@ -58,8 +59,13 @@ const SUBLAYERS: &str = include_str!("files/sublayers.toml");
 
 const LOSSLESS: Attenuation = Attenuation { quality_factor: None, reference_frequency: 1e6 };
 
-const WATER: Fluid =
-    Fluid { thickness: 10e-3, density: 1000.0, sound_speed: 1500.0, attenuation: LOSSLESS };
+const WATER: Fluid = Fluid {
+    sublayers: FluidSublayers::NONE,
+    thickness: 10e-3,
+    density: 1000.0,
+    sound_speed: 1500.0,
+    attenuation: LOSSLESS,
+};
 
 /// The setup that documentation promises where a file is silent.
 const DEFAULT_SETUP: Setup = Setup {
@@ -235,6 +241,7 @@ fn a_complete_job_means_what_it_says() {
         Setup {
             layers: Layers {
                 coupling: Fluid {
+                    sublayers: FluidSublayers::NONE,
                     thickness: 11e-3,
                     density: 1010.0,
                     sound_speed: 1510.0,
@@ -249,6 +256,7 @@ fn a_complete_job_means_what_it_says() {
                     reference_frequency: 0.8e6,
                 },
                 marrow: Fluid {
+                    sublayers: FluidSublayers::NONE,
                     thickness: 12e-3,
                     density: 950.0,
                     sound_speed: 1450.0,

@@ -1,6 +1,8 @@
 //! What is written reads back to the same bits; what is read never panics; a specification is
 //! judged alike whether it comes as a file or not.
 
+#[path = "support/fluids.rs"]
+mod fluids;
 #[path = "round_trips/random_bones.rs"]
 mod random_bones;
 
@@ -25,6 +27,7 @@ use osteon_common::pores::Pores;
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
+use osteon_common::setup_quantity::SetupQuantity;
 use osteon_files::document::Format;
 use osteon_files::file_error::ContentError;
 use osteon_files::{case_file, job_file};
@@ -34,25 +37,11 @@ use proptest::prelude::*;
 #[path = "support/random_setup_parts.rs"]
 mod random_setup_parts;
 
+use fluids::{fluid, positive};
 use random_setup_parts::{attenuation, pulse_form, tone};
 
 const FORMATS: [Format; 2] = [Format::Toml, Format::Json];
 const KINDS: [JobKind; 2] = [JobKind::Identification, JobKind::Propagation];
-
-/// Any positive normal or subnormal number.
-fn positive() -> impl Strategy<Value = f64> {
-    use proptest::num::f64::{NORMAL, POSITIVE, SUBNORMAL};
-    POSITIVE | NORMAL | SUBNORMAL
-}
-
-fn fluid() -> impl Strategy<Value = Fluid> {
-    (4e-3..30e-3, positive(), 1200.0..1800.0).prop_map(|(thickness, density, sound_speed)| Fluid {
-        thickness,
-        density,
-        sound_speed,
-        attenuation: Attenuation::default(),
-    })
-}
 
 fn solver() -> impl Strategy<Value = SolverSettings> {
     let exact = (0.5..1.5)
@@ -221,7 +210,10 @@ fn scattered(
         bone_thickness: scatter(thickness, setup.layers.bone_thickness),
         // The smallest that is accepted is 2.
         bone_quality_factor: scatter(quality, quality_factor.map_or(0.0, |mean| mean - 2.0)),
-        coupling_sound_speed: scatter(speed, setup.layers.coupling.sound_speed),
+        coupling_sound_speed: scatter(
+            speed,
+            SetupQuantity::CouplingSoundSpeed.value_in(setup).unwrap_or(0.0),
+        ),
         probe_tilt: scatter(tilt, setup.probe.tilt),
         porosity: scatter(porosity, setup.pores.porosity.unwrap_or(0.0)),
         ..RandomQuantities::default()
@@ -362,9 +354,9 @@ fn change_prior(job: &mut JobSpecification, prior: PosteriorPrior) {
 }
 
 const EDITS: [Edit; 22] = [
-    |job, x| job.setup.layers.coupling.thickness = x,
+    |job, x| job.setup.layers.coupling = Fluid { thickness: x, ..Layers::default().coupling },
     |job, x| job.setup.layers.bone_thickness = x,
-    |job, x| job.setup.layers.marrow.sound_speed = x,
+    |job, x| job.setup.layers.marrow = Fluid { sound_speed: x, ..Layers::default().marrow },
     |job, x| job.setup.probe.center_frequency = x,
     |job, x| job.setup.probe.pulse = tone(x),
     |job, x| job.setup.probe.element_width = x,

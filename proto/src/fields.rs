@@ -5,8 +5,9 @@
 
 use std::sync::LazyLock;
 
+use osteon_common::field_path::element_path;
 use osteon_common::fields::{
-    self, Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, Number, Section, Whole,
+    self, Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, List, Number, Section, Whole,
     WholeRange,
 };
 use osteon_common::violations::Violations;
@@ -83,8 +84,19 @@ fn field_value(field: &FieldDescriptor, value: &DeclaredValue) -> Option<FieldVa
             fill(&mut message, entries);
             FieldValue::Message(message)
         }
+        (DeclaredValue::List { elements, .. }, Kind::Message(descriptor)) => {
+            let message = |entries: &Vec<DeclaredKey>| {
+                let mut message = DynamicMessage::new(descriptor.clone());
+                fill(&mut message, entries);
+                FieldValue::Message(message)
+            };
+            FieldValue::List(elements.iter().map(message).collect())
+        }
         (
-            DeclaredValue::Choice { .. } | DeclaredValue::Table(_) | DeclaredValue::CustomTable,
+            DeclaredValue::Choice { .. }
+            | DeclaredValue::Table(_)
+            | DeclaredValue::List { .. }
+            | DeclaredValue::CustomTable,
             _,
         ) => return None,
     })
@@ -163,6 +175,23 @@ impl Fields for MessageReader<'_> {
         }
     }
 
+    fn list(&mut self, key: Key, field: &mut dyn List) {
+        let Some((_, FieldValue::List(elements))) = self.get(key.name) else { return };
+        let (path, max) = (self.path(key.name), field.max());
+        if elements.len() > max {
+            let count = elements.len();
+            self.violations.add(path, format!("has {count} elements; at most {max} are accepted"));
+            return;
+        }
+        field.resize(elements.len());
+        for (index, element) in elements.into_iter().enumerate() {
+            let FieldValue::Message(message) = element else { continue };
+            let path = element_path(&path, index);
+            let violations = &mut *self.violations;
+            field.element(index).declare(&mut MessageReader { path, message, violations });
+        }
+    }
+
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {
         if condition.holds {
             return declare(self);
@@ -218,6 +247,10 @@ mod tests {
                     assert_eq!(*names, known, "{}", field.full_name());
                 }
                 (DeclaredValue::Table(entries), Kind::Message(inner)) => check(entries, &inner),
+                (DeclaredValue::List { keys, .. }, Kind::Message(inner)) => {
+                    assert!(field.is_list(), "{}", field.full_name());
+                    check(keys, &inner);
+                }
                 (DeclaredValue::CustomTable, Kind::Message(_)) => {}
                 (value, kind) => panic!("{}: {value:?} as {kind:?}", field.full_name()),
             }

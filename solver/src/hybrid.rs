@@ -30,6 +30,7 @@
 //! error of the waves' speed if the last mesh has fewer than five nodes per wavelength. It is an
 //! estimate of the size, not a bound.
 
+mod column_load;
 #[cfg(feature = "measure")]
 mod convergence;
 mod element;
@@ -49,6 +50,7 @@ use osteon_common::outcome::Outcome;
 
 #[cfg(feature = "measure")]
 pub use self::convergence::{ConvergenceRow, element_convergence, time_step_convergence};
+use self::incident::Incident;
 use self::march::MarchWorkspace;
 use self::passes::Passes;
 use self::plan::WorkBudget;
@@ -110,7 +112,11 @@ impl Hybrid {
     ) -> Result<Arrival, Failure> {
         let bone = bone.sublayers(self.setup.layers.bone_thickness);
         let solids = bone.iter().map(|sublayer| Medium::new(&sublayer.solid).fastest);
-        let speed = solids.fold(self.setup.layers.marrow.sound_speed, f64::max);
+        let mut speed = solids.fold(self.setup.layers.marrow.fastest(), f64::max);
+        if Incident::is_stepped(&self.setup) {
+            // Waves may run in a fluid on their way to the bone.
+            speed = speed.max(self.setup.layers.coupling.fastest());
+        }
         if !speed.is_finite() {
             return Err(speed_not_finite());
         }

@@ -36,7 +36,7 @@ pub use arrival::{Arrival, PassSummary, Sampled};
 pub use complex::Complex;
 pub use exact::guided::{GuidedWave, GuidedWaves};
 #[cfg(feature = "measure")]
-pub use exact::quantities::{admittance, fastest_wave};
+pub use exact::quantities::{admittance, fastest_wave, pressure};
 #[cfg(feature = "measure")]
 pub use exact::stages;
 pub use exact::traces::{TraceError, Traces};

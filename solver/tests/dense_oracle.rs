@@ -11,9 +11,10 @@ use faer::{Mat, c64};
 use osteon_common::attenuation::Attenuation;
 use osteon_common::bone::{Bone, BoneRef, Sublayer, Sublayers};
 use osteon_common::case::Setup;
+use osteon_common::fluid_sublayers::{FluidSublayer, FluidSublayers};
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
-use osteon_solver::{Complex, Solver, admittance};
+use osteon_solver::{Complex, Solver, admittance, pressure};
 
 /// A bone whose moduli are all multiplied by a complex factor.
 struct Plate<'a> {
@@ -212,6 +213,160 @@ fn guided_waves_of_sublayers_leave_both_faces_free() {
                 along < 1e-2 * beside,
                 "{count} of {thickness} m, {wave:?}: {along:e}, {beside:e}"
             );
+        }
+    }
+}
+
+fn fluids(all: &[(f64, f64, f64)]) -> FluidSublayers {
+    let one =
+        |&(thickness, density, sound_speed)| FluidSublayer { thickness, density, sound_speed };
+    FluidSublayers::new(&all.iter().map(one).collect::<Vec<_>>()).unwrap()
+}
+
+/// A fluid: thickness, density, speed of sound.
+type Fluid = (f64, f64, f64);
+
+/// Both waves of a fluid, a exp(-g ζ) and b exp(-g (d - ζ)) with the distance ζ from one face: their pressures
+/// on both faces, and the slopes of these over the density.
+struct Waves {
+    near: [c64; 2],
+    far: [c64; 2],
+    slope_near: [c64; 2],
+    slope_far: [c64; 2],
+}
+
+impl Waves {
+    fn new((d, density, c): Fluid, loss: c64, k: f64, s: c64) -> Self {
+        let g = (s * s / (loss * (c * c)) + k * k).sqrt();
+        let (one, decay, y) = (c64::new(1.0, 0.0), (-g * d).exp(), g / density);
+        let (near, far) = ([one, decay], [decay, one]);
+        Self { near, far, slope_near: [-y, y * decay], slope_far: [-y * decay, y] }
+    }
+}
+
+/// Solves the linear system of all fluids at once, listed from the bone outwards: on its face the slope over
+/// the density and `face` times the pressure are `given`, at the nearer face of the fluids in `driven` the former
+/// falls by 1, and on the outer face p = 0. Returns the pressures on the nearer faces.
+fn dense_fluids(fluids: &[Waves], face: c64, given: c64, driven: &[usize]) -> Vec<c64> {
+    let n = 2 * fluids.len();
+    let (mut matrix, mut right) = (Mat::<c64>::zeros(n, n), Mat::<c64>::zeros(n, 1));
+    right[(0, 0)] = given;
+    for (j, waves) in fluids.iter().enumerate() {
+        let is_last = j + 1 == fluids.len();
+        for i in 0..2 {
+            let column = 2 * j + i;
+            if j == 0 {
+                matrix[(0, column)] = waves.slope_near[i] + face * waves.near[i];
+            } else {
+                matrix[(2 * j - 1, column)] = waves.near[i];
+                matrix[(2 * j, column)] = waves.slope_near[i];
+            }
+            matrix[(2 * j + 1, column)] = if is_last { waves.far[i] } else { -waves.far[i] };
+            if !is_last {
+                matrix[(2 * j + 2, column)] = -waves.slope_far[i];
+            }
+        }
+        if driven.contains(&j) {
+            right[(2 * j, 0)] = c64::new(-1.0, 0.0);
+        }
+    }
+    let solved = matrix.partial_piv_lu().solve(&right);
+    let near = |(j, waves): (usize, &Waves)| {
+        solved[(2 * j, 0)] * waves.near[0] + solved[(2 * j + 1, 0)] * waves.near[1]
+    };
+    fluids.iter().enumerate().map(near).collect()
+}
+
+/// p̂ at the receivers per unit of F; fluids are listed from the bone outwards.
+fn dense_pressure(
+    [above, below]: [&[Fluid]; 2],
+    [above_loss, below_loss]: [c64; 2],
+    plates: &[(f64, Plate<'_>)],
+    (source, receiver): (f64, f64),
+    (k, s): (f64, c64),
+) -> c64 {
+    // The pressure under the bone per displacement downwards: there the slope over the density is -s² of it.
+    let marrow: Vec<_> = below.iter().map(|&fluid| Waves::new(fluid, below_loss, k, s)).collect();
+    let pressure = dense_fluids(&marrow, c64::new(0.0, 0.0), -s * s, &[])[0];
+    // Moved up, the bone pulls: τ3 = -p = Z u3.
+    let admittance = dense_admittance(plates, k, s, pressure);
+    // The fluids above, cut at the source and at the receivers.
+    let (mut pieces, mut starts, mut start) = (Vec::new(), Vec::new(), 0.0);
+    for &(d, density, c) in above {
+        let mut cuts = vec![start, start + d];
+        cuts.extend([source, receiver].into_iter().filter(|z| *z > start && *z < start + d));
+        cuts.sort_by(f64::total_cmp);
+        cuts.dedup();
+        for pair in cuts.windows(2) {
+            pieces.push(Waves::new((pair[1] - pair[0], density, c), above_loss, k, s));
+            starts.push(pair[0]);
+        }
+        start += d;
+    }
+    let at = |height: f64| starts.iter().position(|start| *start == height).unwrap();
+    let zero = c64::new(0.0, 0.0);
+    dense_fluids(&pieces, s * s * admittance, zero, &[at(source)])[at(receiver)]
+}
+
+/// Stacks of one to four fluids on both sides, of densities and speeds much unlike each other; source and
+/// receivers in the same fluid, in different ones, and on joints.
+#[test]
+fn pressures_in_stacks_of_fluids_are_those_of_dense_algebra() {
+    let above = [
+        (1.2e-3, 1090.0, 1580.0),
+        (0.8e-3, 920.0, 1440.0),
+        (1.5e-3, 1150.0, 1730.0),
+        (2e-3, 990.0, 1510.0),
+    ];
+    let below = [
+        (2e-3, 1010.0, 1450.0),
+        (0.5e-3, 700.0, 1200.0),
+        (1e-3, 1300.0, 1900.0),
+        (2e-3, 960.0, 1480.0),
+    ];
+    let point = Point::of_bone([1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.3]);
+    let ensemble = Ensemble::new(&point, 29).unwrap();
+    let places = [(0.4e-3, 0.9e-3), (1.2e-3, 1.2e-3), (0.7e-3, 0.7e-3), (1.0e-3, 0.3e-3)];
+    for (case, quality) in [None, Some(30.0)].into_iter().enumerate() {
+        for count in 1..=4 {
+            let (above, below) = (&above[..count], &below[..5 - count]);
+            let top: f64 = above.iter().map(|fluid| fluid.0).sum();
+            let spread = top / 1.3e-3;
+            for (i, (source, receiver)) in places.into_iter().enumerate() {
+                // The second pair is on a joint, where there is one.
+                let scale = if i == 1 { 1.0 } else { spread };
+                let (source, receiver) = (scale * source, scale * receiver);
+                let mut setup = Setup::default();
+                let layers = &mut setup.layers;
+                layers.coupling.sublayers = fluids(above).reversed();
+                layers.marrow.sublayers = fluids(below);
+                layers.bone_thickness = 1e-3;
+                layers.coupling.attenuation.quality_factor = quality;
+                layers.marrow.attenuation.quality_factor = quality.map(|q| 2.0 * q);
+                layers.bone_attenuation.quality_factor = quality;
+                (setup.probe.source.x3, setup.probe.receivers.x3) = (source, receiver);
+                if i == 1 && count == 1 {
+                    continue;
+                }
+                let bone = ensemble.bone((4 * count + i) as u64).unwrap();
+                for (k, omega) in [(300.0, 1e6), (2500.0, 6e6), (4200.0, 6.2e6), (7000.0, 2e7)] {
+                    let s = c64::new(1.2e6, omega);
+                    let loss = |of: &Attenuation| constant_quality(of, s);
+                    let losses = [&setup.layers.coupling, &setup.layers.marrow]
+                        .map(|f| loss(&f.attenuation));
+                    let factor = loss(&setup.layers.bone_attenuation);
+                    let plates = [(1e-3, Plate { bone: &bone, factor })];
+                    let expected =
+                        dense_pressure([above, below], losses, &plates, (source, receiver), (k, s));
+                    let found = pressure(&setup, &bone, k, Complex::new(s.re, s.im));
+                    let error = (c64::new(found.re, found.im) - expected).norm() / expected.norm();
+                    // Waves from the faces that cancel, and the dense side's exponentials, cost digits.
+                    assert!(
+                        error < 1e-9,
+                        "case {case}, {count} above, places {i}, k {k}: {error:e}"
+                    );
+                }
+            }
         }
     }
 }

@@ -4,6 +4,7 @@ use osteon_common::attenuation::Attenuation;
 use osteon_common::case::{Bone, Case, Setup};
 use osteon_common::check;
 use osteon_common::elasticity::EngineeringConstants;
+use osteon_common::fluid_sublayers::FluidSublayers;
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Point;
 use osteon_common::probe::{Probe, Receivers, Source};
@@ -317,6 +318,7 @@ fn fluid(generator: &mut Generator, ranges: &Ranges) -> Fluid {
         density: draw(ranges.fluid_density),
         sound_speed: generator.between(1000.0, 2000.0),
         attenuation: Attenuation::default(),
+        sublayers: FluidSublayers::NONE,
     }
 }
 

@@ -69,6 +69,13 @@ fn values(
     {
         return;
     }
+    let speed = Parameter::CouplingSoundSpeed;
+    if group.known.get(speed).is_some() && !specification.setup.layers.coupling.sublayers.is_empty()
+    {
+        let message =
+            "is given, but each of layers.coupling.sublayers has its own; leave one of them out";
+        return violations.add(field(speed, group, origin), message);
+    }
     // Not by way of a point, where 0 means that the setup's value stays.
     let with = |setup: Setup, (parameter, value): (Parameter, f64)| {
         parameter.of_setup().map_or(setup, |quantity| quantity.with(value, setup))

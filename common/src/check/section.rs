@@ -1,9 +1,10 @@
 //! Checks the declared keys of a section, each by itself.
 
 use crate::accepted::WholeRange;
-use crate::field_path::entry_path;
+use crate::field_path::{element_path, entry_path};
 use crate::fields::{
-    Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, Number, Section, Whole, entries,
+    Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, List, Number, Section, Whole,
+    entries,
 };
 use crate::violations::Violations;
 
@@ -85,6 +86,14 @@ impl Fields for Checker<'_> {
     fn table(&mut self, key: Key, declare: &mut dyn FnMut(&mut dyn Fields)) {
         let path = entry_path(&self.path, key.name);
         declare(&mut Checker { path, violations: self.violations });
+    }
+
+    fn list(&mut self, key: Key, field: &mut dyn List) {
+        let list = entry_path(&self.path, key.name);
+        for index in 0..field.len() {
+            let path = element_path(&list, index);
+            field.element(index).declare(&mut Checker { path, violations: self.violations });
+        }
     }
 
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {

@@ -26,7 +26,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
     pores(&setup.pores, violations);
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);
-    element_width(&setup.probe, violations);
+    element_width(setup, violations);
     tilted(setup, violations);
     method(setup, violations);
     sampling(setup, violations);
@@ -34,8 +34,8 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
 
 /// Checks that source and receivers lie inside fluid 1: 0 < x3 < h1.
 fn heights(setup: &Setup, violations: &mut Violations) {
-    let top = setup.layers.coupling.thickness;
-    let accepted = if known_wrong("layers.coupling.thickness", violations) {
+    let top = setup.layers.coupling.whole_thickness();
+    let accepted = if violations.has_at_or_below("layers.coupling") {
         Interval::above(0.0, "m")
     } else {
         Interval::between(0.0, top, "m, inside the coupling layer")
@@ -95,15 +95,22 @@ fn one_side(probe: &Probe, violations: &mut Violations) {
     }
 }
 
-/// Checks that no two elements overlap.
-fn element_width(probe: &Probe, violations: &mut Violations) {
+/// Checks that no two elements overlap, and that they lie in one fluid.
+fn element_width(setup: &Setup, violations: &mut Violations) {
+    const FIELD: &str = "probe.element_width";
+    let probe = &setup.probe;
     if violations.has_at_or_below("probe") {
         return;
+    }
+    if probe.element_width > 0.0 && !setup.layers.coupling.sublayers.is_empty() {
+        let message = "is given together with layers.coupling.sublayers, and elements of a width are \
+                       computed in one fluid alone; leave one of them out";
+        return violations.add(FIELD, message);
     }
     let nearest = probe.distances().fold(probe.receivers.pitch, f64::min);
     if probe.element_width >= nearest {
         violations.add(
-            "probe.element_width",
+            FIELD,
             format!(
                 "is {:?}; elements must not overlap: it must be below {nearest:?} m, the distance of the \
                  nearest two of source and receivers",
@@ -116,13 +123,12 @@ fn element_width(probe: &Probe, violations: &mut Violations) {
 /// Checks that a tilted probe remains inside fluid 1, and in front of its source.
 fn tilted(setup: &Setup, violations: &mut Violations) {
     let probe = &setup.probe;
-    let known_wrong = ["probe", "layers.coupling.thickness"]
-        .iter()
-        .any(|field| violations.has_at_or_below(field));
+    let known_wrong =
+        ["probe", "layers.coupling"].iter().any(|field| violations.has_at_or_below(field));
     if known_wrong || probe.tilt == 0.0 {
         return;
     }
-    let top = setup.layers.coupling.thickness;
+    let top = setup.layers.coupling.whole_thickness();
     let other_side = probe.bidirectional.then(|| probe.from_other_side());
     for probe in [*probe].into_iter().chain(other_side) {
         let heights = || probe.places().map(|place| place.x3).chain([probe.source.x3]);

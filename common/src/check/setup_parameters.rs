@@ -28,7 +28,7 @@ pub(super) fn setup_parameters(specification: &JobSpecification, violations: &mu
             Range::Free { .. } if quantity.value_in(&specification.setup).is_none() => violations
                 .add(
                     path,
-                    format!("is searched, and {} is not given; give both", quantity.mean_key()),
+                    format!("is searched, and {} {}", quantity.mean_key(), quantity.lacking()),
                 ),
             searched @ Range::Free { lower, upper, .. } => {
                 range(parameter, searched, violations);

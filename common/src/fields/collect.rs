@@ -2,7 +2,7 @@
 
 use crate::accepted::WholeRange;
 
-use super::{Choice, Condition, Fields, Key, Number, Section, Whole};
+use super::{Choice, Condition, Fields, Key, List, Number, Section, Whole};
 
 /// A declared key with its value.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +33,15 @@ pub enum DeclaredValue {
     },
     /// A table.
     Table(Vec<DeclaredKey>),
+    /// A list of tables.
+    List {
+        /// The keys of each element.
+        elements: Vec<Vec<DeclaredKey>>,
+        /// Keys that every element has, with any values.
+        keys: Vec<DeclaredKey>,
+        /// Largest number of elements.
+        max: usize,
+    },
     /// A table that has code of its own.
     CustomTable,
 }
@@ -104,6 +113,12 @@ impl Fields for Collector {
         let mut inner = Self::default();
         declare(&mut inner);
         self.push(key, DeclaredValue::Table(inner.entries));
+    }
+
+    fn list(&mut self, key: Key, field: &mut dyn List) {
+        let elements = (0..field.len()).map(|index| entries(field.element(index))).collect();
+        let keys = entries(&mut *field.example());
+        self.push(key, DeclaredValue::List { elements, keys, max: field.max() });
     }
 
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {

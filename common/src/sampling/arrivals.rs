@@ -1,20 +1,29 @@
 //! Earliest possible arrivals: bounds from geometry and the fastest wave.
 
+use crate::attenuation::Attenuation;
 use crate::case::Setup;
-use crate::layers::Fluid;
+use crate::fluid_sublayers::FluidSublayers;
 use crate::probe::Place;
+
+use super::fluid_path::{FluidPath, earliest_in_fluids, slowness};
 
 /// Returns the highest speed, m/s, of waves along the bone, in which none is faster than `in_bone` (m/s)
 /// at the reference frequency of its attenuation.
 pub fn fastest(setup: &Setup, in_bone: f64) -> f64 {
     let attenuation = &setup.layers.bone_attenuation;
     let in_bone = in_bone * attenuation.fastest(setup.probe.band_unit());
-    in_bone.max(fastest_in(&setup.layers.marrow, setup))
+    let marrow = &setup.layers.marrow;
+    in_bone.max(fastest_in(&setup.layers.marrow_fluids(), &marrow.attenuation, setup))
 }
 
-/// Returns the highest speed, m/s, of waves in a fluid of the setup.
-pub fn fastest_in(fluid: &Fluid, setup: &Setup) -> f64 {
-    fluid.sound_speed * fluid.attenuation.fastest(setup.probe.band_unit())
+/// Returns the highest speed, m/s, of waves in the coupling.
+pub fn fastest_in_coupling(setup: &Setup) -> f64 {
+    let coupling = &setup.layers.coupling;
+    fastest_in(&setup.layers.coupling_fluids(), &coupling.attenuation, setup)
+}
+
+fn fastest_in(fluids: &FluidSublayers, attenuation: &Attenuation, setup: &Setup) -> f64 {
+    fluids.fastest() * attenuation.fastest(setup.probe.band_unit())
 }
 
 /// Returns the earliest possible arrival, s, at a receiver's place of a wave that travels along the
@@ -23,12 +32,26 @@ pub fn fastest_in(fluid: &Fluid, setup: &Setup) -> f64 {
 /// It is a lower bound at every distance: within the critical one the reflected wave arrives later.
 /// Elements of a width are heard from their nearest ends.
 pub fn earliest_arrival(setup: &Setup, place: Place, speed: f64) -> f64 {
-    let c1 = setup.layers.coupling.sound_speed;
-    let heights = place.x3 + setup.probe.source.x3;
-    if speed <= c1 {
-        return reflected_arrival(setup, place) - setup.probe.element_width / c1;
+    let fluids = setup.layers.coupling_fluids();
+    let path = FluidPath::by_the_bone(&fluids, setup.probe.source.x3, place.x3);
+    match fluids.as_slice() {
+        [one] if speed <= one.sound_speed => {
+            path.ray(place.x) - setup.probe.element_width / one.sound_speed
+        }
+        _ => {
+            let speed = fastest_way(&fluids, speed);
+            place.x / speed + path.delay(speed) - lead(setup, speed)
+        }
     }
-    place.x / speed + heights * slowness(c1, speed) - lead(setup, c1, speed)
+}
+
+/// Returns the highest speed along x1, m/s, of what may run in the fluids on its way, too, and else at up to
+/// `speed` (m/s). One fluid is no way: what runs in it meets the bone in vain.
+fn fastest_way(fluids: &FluidSublayers, speed: f64) -> f64 {
+    match fluids.as_slice() {
+        [_] => speed,
+        _ => speed.max(fluids.fastest()),
+    }
 }
 
 /// Returns the earliest possible arrival, s, at a receiver's place of a reflection of an outer face, for
@@ -44,11 +67,18 @@ pub fn echoes_are_audible(setup: &Setup, speed: f64) -> bool {
 }
 
 /// Returns the arrival, s, of the direct wave in the coupling fluid at a receiver's place, from the nearest
-/// ends of the elements.
+/// ends of the elements; in sublayers, of the first wave that does not meet the bone.
 pub fn direct_arrival(setup: &Setup, place: Place) -> f64 {
-    let (along, upwards) = setup.probe.element_extent();
-    let (x, across) = (place.x - along, place.x3 - setup.probe.source.x3 - upwards);
-    x.mul_add(x, across * across).sqrt() / setup.layers.coupling.sound_speed
+    let fluids = setup.layers.coupling_fluids();
+    let source = setup.probe.source.x3;
+    match fluids.as_slice() {
+        [one] => {
+            let (along, upwards) = setup.probe.element_extent();
+            let (x, across) = (place.x - along, place.x3 - source - upwards);
+            x.mul_add(x, across * across).sqrt() / one.sound_speed
+        }
+        _ => earliest_in_fluids(&fluids, source, place.x3, place.x),
+    }
 }
 
 /// Returns the smallest and the largest distance along the bone, m, of a receiver from the source, each
@@ -62,10 +92,10 @@ pub fn nearest_and_farthest(setup: &Setup) -> (f64, f64) {
     (nearest - width, farthest + width)
 }
 
-/// Returns √(1/c² - 1/v²), s/m: the slowness across the layer of a wave that travels along it at
-/// `v`.
-pub fn slowness(c: f64, v: f64) -> f64 {
-    (1.0 / (c * c) - 1.0 / (v * v)).max(0.0).sqrt()
+/// Returns the path from the source by way of the bone to the lowest receiver.
+pub(super) fn by_the_bone(setup: &Setup) -> FluidPath {
+    let fluids = setup.layers.coupling_fluids();
+    FluidPath::by_the_bone(&fluids, setup.probe.source.x3, setup.probe.lowest_receiver())
 }
 
 /// Returns whether what arrives at the time that `echo` gives is before the direct wave at some receiver.
@@ -76,35 +106,32 @@ pub(super) fn is_audible(setup: &Setup, speed: f64, echo: fn(&Setup, Place, f64)
 /// Returns the end, s, of the arrival at a receiver's place of the wave reflected by the bone's upper face:
 /// the time from the farthest ends of the elements.
 pub(super) fn last_reflected_arrival(setup: &Setup, place: Place) -> f64 {
-    let across_elements = setup.probe.element_width / setup.layers.coupling.sound_speed;
-    reflected_arrival(setup, place) + across_elements
-}
-
-/// Returns the arrival, s, at a receiver's place of the wave reflected by the bone's upper face, from the
-/// middles of the elements.
-fn reflected_arrival(setup: &Setup, place: Place) -> f64 {
-    let (x, heights) = (place.x, place.x3 + setup.probe.source.x3);
-    x.mul_add(x, heights * heights).sqrt() / setup.layers.coupling.sound_speed
+    let fluids = setup.layers.coupling_fluids();
+    let path = FluidPath::by_the_bone(&fluids, setup.probe.source.x3, place.x3);
+    path.ray(place.x) + setup.probe.element_width / path.slowest()
 }
 
 /// Returns at most how much earlier, s, than between their middles a wave travels between the ends of two
-/// elements, if it leaves and reaches them through a fluid with this speed of sound (m/s).
-fn lead(setup: &Setup, sound_speed: f64, speed: f64) -> f64 {
+/// elements. Only those in one fluid have a width.
+fn lead(setup: &Setup, speed: f64) -> f64 {
     let (along, upwards) = setup.probe.element_extent();
-    along / speed + upwards.abs() * slowness(sound_speed, speed)
+    along / speed + upwards.abs() * slowness(by_the_bone(setup).slowest(), speed)
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the coupling's outer face.
 pub(super) fn upper_echo(setup: &Setup, place: Place, speed: f64) -> f64 {
-    let coupling = &setup.layers.coupling;
-    let path = 2.0 * coupling.thickness - (place.x3 - setup.probe.source.x3).abs();
-    place.x / speed + path * slowness(coupling.sound_speed, speed)
-        - lead(setup, coupling.sound_speed, speed)
+    let fluids = setup.layers.coupling_fluids();
+    let path = FluidPath::by_the_outer_face(&fluids, setup.probe.source.x3, place.x3);
+    let speed = fastest_way(&fluids, speed);
+    place.x / speed + path.delay(speed) - lead(setup, speed)
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the marrow's outer face.
 pub(super) fn lower_echo(setup: &Setup, place: Place, speed: f64) -> f64 {
-    let marrow = &setup.layers.marrow;
-    let across = 2.0 * marrow.thickness * slowness(marrow.sound_speed, speed);
+    let fluids = setup.layers.marrow_fluids();
+    let across = fluids
+        .as_slice()
+        .iter()
+        .fold(0.0, |sum, fluid| sum + 2.0 * fluid.thickness * slowness(fluid.sound_speed, speed));
     earliest_arrival(setup, place, speed) + across
 }

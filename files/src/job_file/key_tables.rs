@@ -86,15 +86,25 @@ fn rows_of(table: &str, DeclaredKey { key, value, condition }: &DeclaredKey) -> 
         None => key.meaning.to_owned(),
     };
     let default = match value {
-        DeclaredValue::Table(_) => None,
+        DeclaredValue::Table(_) | DeclaredValue::List { .. } => None,
         value => toml_text::value(value),
     };
     let default = default.map(|text| format!("`{text}`")).unwrap_or_default();
     let own = row(&path, &default, &allowed(value), &meaning);
     match value {
         DeclaredValue::Table(entries) => own + &rows(&path, entries),
+        DeclaredValue::List { keys, .. } => own + &elements(&path, keys),
         _ => own,
     }
+}
+
+/// Returns the rows of the keys of a list's elements, which have no defaults.
+fn elements(list: &str, keys: &[DeclaredKey]) -> String {
+    let each = |entry: &DeclaredKey| {
+        let path = format!("{list}[].{}", entry.key.name);
+        row(&path, "", &allowed(&entry.value), entry.key.meaning)
+    };
+    keys.iter().map(each).collect()
 }
 
 fn allowed(value: &DeclaredValue) -> String {
@@ -105,6 +115,7 @@ fn allowed(value: &DeclaredValue) -> String {
         DeclaredValue::Choice { names, .. } => {
             names.iter().map(|name| format!("`\"{name}\"`")).collect::<Vec<_>>().join(" or ")
         }
+        DeclaredValue::List { max, .. } => format!("a list of 1 to {max} tables"),
         DeclaredValue::Table(_) | DeclaredValue::CustomTable => String::new(),
     }
 }

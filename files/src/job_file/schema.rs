@@ -78,12 +78,28 @@ fn property(DeclaredKey { key, value, condition }: &DeclaredKey) -> Json {
         DeclaredValue::Boolean(default) => json!({ "type": "boolean", "default": default }),
         DeclaredValue::Choice { chosen, names } => json!({ "enum": names, "default": chosen }),
         DeclaredValue::Table(entries) => table(entries),
+        DeclaredValue::List { keys, max, .. } => list(key.name, keys, *max),
         DeclaredValue::CustomTable => object(json!({})),
     };
     let only = condition.as_ref().map(|condition| format!("only {}: ", condition.description));
     let meaning = format!("{}{}", only.unwrap_or_default(), key.meaning);
     property["description"] = plain(&meaning).into();
     property
+}
+
+/// Returns the schema of a list of tables whose numbers must all be given.
+fn list(name: &str, keys: &[DeclaredKey], max: usize) -> Json {
+    let mut element = table(keys);
+    element["description"] = format!("one of {name}").into();
+    element["required"] = keys.iter().map(|entry| entry.key.name).collect();
+    for DeclaredKey { key, value, .. } in keys {
+        if let DeclaredValue::Number(_, accepted) = value {
+            let mut number = number(None, accepted.interval);
+            number["description"] = plain(key.meaning).into();
+            element["properties"][key.name] = number;
+        }
+    }
+    json!({ "type": "array", "items": element, "minItems": 1, "maxItems": max })
 }
 
 fn number(default: Option<f64>, accepted: Interval) -> Json {

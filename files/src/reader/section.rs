@@ -1,8 +1,10 @@
 //! Reads a section of a file: an implementation of [`Fields`] that, for each key that the section
 //! declares, reads its value from a table of the file.
 
+use osteon_common::field_path::element_path;
 use osteon_common::fields::{
-    self, Choice, Condition, Fields, Key, Number, Section, Whole, WholeRange,
+    self, Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, List, Number, Section, Whole,
+    WholeRange,
 };
 
 use super::{Reader, Table};
@@ -61,6 +63,27 @@ impl Fields for TableReader<'_, '_> {
         declare(&mut TableReader { reader: self.reader, table });
     }
 
+    fn list(&mut self, key: Key, field: &mut dyn List) {
+        let (path, max) = (self.table.path(key.name), field.max());
+        let expected = format!("a list of 1 to {max} tables");
+        let Some(nodes) = self.reader.list(&self.table, key.name, &expected) else { return };
+        if !(1..=max).contains(&nodes.len()) {
+            let message = format!("has {} elements; it must be {expected}", nodes.len());
+            self.reader.violations.add(path, message);
+            return;
+        }
+        field.resize(nodes.len());
+        let keys = fields::entries(&mut *field.example());
+        let names: Vec<_> = keys.iter().map(|entry| entry.key.name).collect();
+        for (index, node) in nodes.iter().enumerate() {
+            let table = self.reader.table_at(node, element_path(&path, index), &names);
+            if table.is_table() {
+                require(self.reader, &table, &keys);
+            }
+            field.element(index).declare(&mut TableReader { reader: self.reader, table });
+        }
+    }
+
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {
         if condition.holds {
             return declare(self);
@@ -76,4 +99,15 @@ impl Fields for TableReader<'_, '_> {
 
     /// Such a table is read by its own code, see `crate::job_file`.
     fn custom_table(&mut self, _: Key) {}
+}
+
+/// Records the numbers among `keys` that `table` does not have.
+fn require(reader: &mut Reader, table: &Table<'_>, keys: &[DeclaredKey]) {
+    for DeclaredKey { key, value, .. } in keys {
+        if let DeclaredValue::Number(_, accepted) = value
+            && !table.has(key.name)
+        {
+            reader.missing(table, key.name, accepted.interval);
+        }
+    }
 }

@@ -96,6 +96,29 @@ fn known_quantities_of_groups() {
 }
 
 #[test]
+fn the_speed_of_sublayers_of_the_coupling_is_not_random_searched_or_known() {
+    let coupling = "thickness = 11e-3, density = 1010.0, sound_speed = 1510.0";
+    let sublayers = "sublayers = [{ thickness = 6e-3, density = 990.0, sound_speed = 1480.0 }, \
+                     { thickness = 5e-3, density = 1060.0, sound_speed = 1570.0 }]";
+    let random =
+        "[random.coupling_sound_speed]\nstandard_deviation = 10.0\ndistribution = \"uniform\"\n";
+    let given = "velocities = [3900.5, 4000, 3950.25]";
+    // The value is the default, which a setup of sublayers keeps.
+    let known = "groups.a = { velocities = [3900.0, 4000.0], coupling_sound_speed = 1500.0 }";
+    let searched =
+        format!("[parameters.coupling_sound_speed]\nbounds = [1450.0, 1550.0]\n\n{FIRST}");
+    let of_stack = edited(coupling, sublayers);
+    let fixed = of_stack.replace(random, "");
+    let texts = [
+        ("random", of_stack),
+        ("searched", fixed.replace(FIRST, &searched)),
+        ("known", fixed.replace(given, known)),
+    ];
+    let refusals = texts.map(|(what, text)| (what, super::refusal(&text, JobKind::Identification)));
+    super::pin("rejected_speed_of_sublayers", refusals);
+}
+
+#[test]
 fn a_quantity_of_the_setup_starts_at_its_value_there() {
     let (from, to) = with("bone_thickness", "bounds = [2e-3, 5e-3]");
     let text = edited(from, &to);

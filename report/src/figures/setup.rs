@@ -29,7 +29,8 @@ pub(crate) fn setup_figure(setup: &Setup) -> Figure {
         all().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     let (left, right) = (low - 4.0, high + 4.0);
     let bone = mm(layers.bone_thickness);
-    let [above, below] = [layers.coupling.thickness, layers.marrow.thickness].map(mm);
+    let [above, below] =
+        [&layers.coupling, &layers.marrow].map(|fluid| mm(fluid.whole_thickness()));
     // Fluid layers may be far thicker than anything else.
     let most = (right - left) * 0.4;
     let [shown_above, shown_below] = [above.min(most), below.min(most)];

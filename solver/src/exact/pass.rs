@@ -126,7 +126,9 @@ fn sampling_error(
 /// Returns the ratio of a band's error to the one that other tapers usually show: in a thin plate, or on
 /// a heavy marrow, the error falls slowly as the band grows, which tapers do not show.
 pub(crate) fn slow_decay_factor(setup: &Setup) -> f64 {
-    let heaviness = (setup.layers.marrow.density / HEAVY_MARROW).max(1.0);
+    let fluids = setup.layers.marrow_fluids();
+    let densest = fluids.as_slice().iter().fold(0.0, |most: f64, fluid| fluid.density.max(most));
+    let heaviness = (densest / HEAVY_MARROW).max(1.0);
     (sampling::thinness(setup) * heaviness).min(SLOW_DECAY_MAX)
 }
 

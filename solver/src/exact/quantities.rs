@@ -2,11 +2,14 @@
 
 use osteon_common::bone::BoneRef;
 use osteon_common::case::Setup;
+use osteon_common::sampling::WaveSampling;
 
 use crate::complex::Complex;
 use crate::exact::attenuation::LosslessFrequencies;
+use crate::exact::fluid_spectra::{FluidSpectra, SourceWaves};
+use crate::exact::heights::Heights;
 use crate::exact::plate_stack::PlateStack;
-use crate::exact::tables;
+use crate::exact::spectral_point::{marrow_load, spectral_point};
 use crate::isa::Isa;
 use crate::lanes::{ComplexLanes, Lanes};
 use crate::media::Media;
@@ -27,7 +30,7 @@ pub fn admittance<'a>(setup: &Setup, bone: impl Into<BoneRef<'a>>, k: f64, s: Co
     let mut plates = PlateStack::<11>::default();
     plates.fill(isa, &media);
     let lossless = LosslessFrequencies::at(&setup.layers, s);
-    let load = tables::marrow_load(setup, s, &lossless, k, true);
+    let load = marrow_load(setup, s, &lossless, k, true);
     let load = ComplexLanes { re: Lanes::splat(load.re), im: Lanes::splat(load.im) };
     plates.prepare(isa, &media, lossless.bone, &Lanes::splat(k.abs()));
     let k = Lanes::splat(k);
@@ -38,4 +41,22 @@ pub fn admittance<'a>(setup: &Setup, bone: impl Into<BoneRef<'a>>, k: f64, s: Co
     let mut impedance = ComplexLanes::ZERO;
     found.store(&mut impedance, 0);
     -(lossless.bone_compliance / Complex::new(impedance.re.0[0], impedance.im.0[0]))
+}
+
+/// Pressure p̂(k, s) at the height of the receivers of a level probe per unit of F, s²/m² Pa: of all waves,
+/// with the reflections of both outer faces.
+///
+/// `k` in rad/m; `s` in 1/s with a positive real part.
+pub fn pressure<'a>(setup: &Setup, bone: impl Into<BoneRef<'a>>, k: f64, s: Complex) -> Complex {
+    let (heights, lossless) =
+        (Heights::from_setup(setup), LosslessFrequencies::at(&setup.layers, s));
+    // Only whether faces are heard is asked of it.
+    let sampling = WaveSampling::for_traces(setup, 5000.0, 20e-6);
+    let point = spectral_point(setup, &heights, &sampling, (s, &lossless), k);
+    let impedance = -(lossless.bone_compliance / admittance(setup, bone, k, s));
+    let inertia = (lossless.bone * lossless.bone).scale(heights.face_density());
+    let gd = point.g * impedance;
+    let of_bone = point.factor * gd / (gd + inertia + (gd - inertia) * point.echo);
+    let waves = SourceWaves::new(&FluidSpectra::new(setup), k, lossless.coupling);
+    of_bone + waves.pressure(heights.lowest - heights.source)
 }

@@ -10,8 +10,10 @@ use osteon_common::sampling::{FrequencyRun, RUN, WaveSampling};
 
 use crate::complex::Complex;
 use crate::exact::attenuation::LosslessFrequencies;
-use crate::exact::element_average::ElementAverage;
+use crate::exact::fluid_waves::{FluidWaves, vertical_wavenumber};
 use crate::exact::height_factors::{HeightFactors, height_factors};
+use crate::exact::heights::Heights;
+use crate::exact::spectral_point::spectral_point;
 use crate::exact::table_memory::TableMemory;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
 use crate::pulse::Pulse;
@@ -48,19 +50,6 @@ pub(crate) enum Waves {
     Early,
 }
 
-/// Heights of source and receivers above the bone, m.
-#[derive(Debug, Clone, Copy)]
-struct Heights {
-    source: f64,
-    lowest: f64,
-    /// Height of a receiver above the next lower one; 0 if all have one height.
-    step: f64,
-    /// Whether receivers with larger numbers are lower.
-    falling: bool,
-    /// What source and receivers average over; `None` if they are lines.
-    elements: Option<ElementAverage>,
-}
-
 /// One complex frequency.
 #[derive(Debug)]
 pub(crate) struct Line {
@@ -86,7 +75,7 @@ pub(crate) struct KeptLine {
     blocks: Vec<Block>,
     /// exp(-2 g h1) of the blocks if echoes of the coupling's outer face matter, otherwise empty.
     echoes: Vec<ComplexLanes>,
-    /// The height factors of every block if the probe is tilted, otherwise empty.
+    /// The height factors of every block and fluid if the probe is tilted, otherwise empty.
     height_factors: Vec<HeightFactors>,
 }
 
@@ -121,7 +110,7 @@ impl Tables {
         taper: (f64, f64),
         memory: Option<Arc<TableMemory>>,
     ) -> Self {
-        let probe = &setup.probe;
+        let (probe, heights) = (&setup.probe, Heights::from_setup(setup));
         let runs = sampling.runs();
         let numbers: Vec<usize> = runs.iter().flat_map(|run| run.frequencies()).collect();
         let spectrum =
@@ -129,7 +118,7 @@ impl Tables {
         let lines: Vec<_> = numbers
             .iter()
             .zip(spectrum)
-            .map(|(&n, pulse)| Line::new(setup, &sampling, n, pulse, taper))
+            .map(|(&n, pulse)| Line::new(setup, &heights, &sampling, n, pulse, taper))
             .collect();
         let blocks = lines.iter().map(|line| line.blocks).max().unwrap_or(0);
         let positions: Vec<f64> = setup.probe.places().map(|place| place.x).collect();
@@ -145,7 +134,7 @@ impl Tables {
             .collect();
         Self {
             setup: *setup,
-            heights: Heights::from_setup(setup),
+            heights,
             sampling,
             runs,
             lines,
@@ -161,7 +150,7 @@ impl Tables {
     /// Returns the contents of a line, empty if they are not kept.
     pub(crate) fn kept_line<'a>(&self, line: &'a Line) -> &'a KeptLine {
         line.kept.get_or_init(|| match &self.memory {
-            Some(memory) if memory.reserve(line.bytes(&self.sampling, self.is_tilted())) => {
+            Some(memory) if memory.reserve(line.bytes(&self.sampling, &self.heights)) => {
                 line.contents(&self.setup, &self.heights, &self.sampling)
             }
             _ => KeptLine::default(),
@@ -185,21 +174,27 @@ impl Tables {
         (block, echo)
     }
 
+    /// Returns the numbers at which the receivers in one fluid after the other end, upwards.
+    #[inline(always)]
+    pub(crate) fn receivers_in_fluids(&self) -> &[usize] {
+        &self.heights.ends
+    }
+
     /// Returns the factors of block `b` of a line that lead from one receiver of a tilted probe to the
-    /// next higher one, from its contents or computed into `scratch`.
+    /// next higher one in the same fluid, from its contents or computed into `scratch`. Fluids with receivers
+    /// are numbered upwards.
     #[inline(always)]
     pub(crate) fn height_factors<'a>(
         &self,
         line: &Line,
         kept: &'a KeptLine,
         b: usize,
+        fluid: usize,
         scratch: &'a mut Option<HeightFactors>,
     ) -> &'a HeightFactors {
-        match kept.height_factors.get(b) {
+        match kept.height_factors.get(b * self.heights.ends.len() + fluid) {
             Some(factors) => factors,
-            None => {
-                scratch.insert(line.height_factors(&self.setup, &self.heights, &self.sampling, b))
-            }
+            None => scratch.insert(line.height_factors(&self.heights, &self.sampling, b, fluid)),
         }
     }
 
@@ -208,11 +203,11 @@ impl Tables {
         self.heights.are_different()
     }
 
-    /// Returns the receivers from the lowest to the highest.
+    /// Returns the receivers with these numbers, counted from the lowest to the highest.
     #[inline(always)]
-    pub(crate) fn upwards(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn upwards(&self, numbers: Range<usize>) -> impl Iterator<Item = usize> {
         let (receivers, falling) = (self.receivers, self.heights.falling);
-        (0..receivers).map(move |i| if falling { receivers - 1 - i } else { i })
+        numbers.map(move |i| if falling { receivers - 1 - i } else { i })
     }
 
     /// Returns the wavenumbers of block `b`, rad/m, which are the same at every frequency.
@@ -255,28 +250,10 @@ impl Tables {
     }
 }
 
-impl Heights {
-    fn from_setup(setup: &Setup) -> Self {
-        let probe = &setup.probe;
-        let heights: Vec<f64> = probe.places().map(|place| place.x3).collect();
-        Self {
-            source: probe.source.x3,
-            lowest: probe.lowest_receiver(),
-            step: probe.receivers.pitch * libm::sin(probe.tilt).abs(),
-            falling: heights.first() > heights.last(),
-            elements: ElementAverage::from_probe(probe),
-        }
-    }
-
-    /// Returns whether the receivers are at different heights.
-    fn are_different(&self) -> bool {
-        self.step != 0.0
-    }
-}
-
 impl Line {
     fn new(
         setup: &Setup,
+        heights: &Heights,
         sampling: &WaveSampling,
         n: usize,
         pulse: Complex,
@@ -284,7 +261,7 @@ impl Line {
     ) -> Self {
         let s = Complex::new(sampling.damping, sampling.angular_frequency(n));
         let lossless = LosslessFrequencies::at(&setup.layers, s);
-        let inertia = (lossless.bone * lossless.bone).scale(setup.layers.coupling.density);
+        let inertia = (lossless.bone * lossless.bone).scale(heights.face_density());
         let within = sampling.is_within(n, taper);
         let blocks = if within { sampling.wavenumbers(n) / LANES } else { 0 };
         // Of the two signs of every frequency but zero, only one is summed: hence the sum's factor
@@ -294,9 +271,10 @@ impl Line {
     }
 
     /// Returns the memory of the line's contents, bytes.
-    fn bytes(&self, sampling: &WaveSampling, is_tilted: bool) -> u64 {
+    fn bytes(&self, sampling: &WaveSampling, heights: &Heights) -> u64 {
         let echo = if sampling.upper_echoes { size_of::<ComplexLanes>() } else { 0 };
-        let factors = if is_tilted { size_of::<HeightFactors>() } else { 0 };
+        let fluids = if heights.are_different() { heights.ends.len() } else { 0 };
+        let factors = fluids * size_of::<HeightFactors>();
         (self.blocks * (size_of::<Block>() + echo + factors)) as u64
     }
 
@@ -308,7 +286,8 @@ impl Line {
             let (block, echo) = self.block(setup, heights, sampling, b);
             kept.blocks.push(block);
             if heights.are_different() {
-                kept.height_factors.push(self.height_factors(setup, heights, sampling, b));
+                let of = |fluid| self.height_factors(heights, sampling, b, fluid);
+                kept.height_factors.extend((0..heights.ends.len()).map(of));
             }
             if sampling.upper_echoes {
                 kept.echoes.push(echo);
@@ -331,7 +310,8 @@ impl Line {
         for lane in 0..LANES {
             let m = b * LANES + lane;
             let k = m as f64 * sampling.wavenumber_step;
-            let point = spectral_point(setup, heights, sampling, self, k);
+            let frequencies = (self.s, &self.lossless);
+            let point = spectral_point(setup, heights, sampling, frequencies, k);
             // The trapezoidal rule from k = 0 on, for (1/π) ∫ … cos(kx) dk.
             let end = if m == 0 { 0.5 } else { 1.0 };
             let measure = end * sampling.wavenumber_step / PI;
@@ -344,109 +324,43 @@ impl Line {
         (block, echo)
     }
 
-    /// Computes the factors of one block that lead from one receiver to the next higher one.
+    /// Computes the factors of one block that lead from one receiver in a fluid to the next higher one.
     fn height_factors(
         &self,
-        setup: &Setup,
         heights: &Heights,
         sampling: &WaveSampling,
         b: usize,
+        fluid: usize,
     ) -> HeightFactors {
-        let coupling = &setup.layers.coupling;
-        let below_face = sampling.upper_echoes.then_some(coupling.thickness - heights.lowest);
-        let [mut from_below, mut from_above, mut image] = [ComplexLanes::ZERO; 3];
+        let zero = ComplexLanes::ZERO;
+        let mut factors =
+            HeightFactors { start: zero, from_below: zero, from_above: zero, image: zero };
         for lane in 0..LANES {
             let k = (b * LANES + lane) as f64 * sampling.wavenumber_step;
-            let g = vertical_wavenumber(k, self.lossless.coupling, coupling.sound_speed);
-            let [below, above, ratio] = height_factors(g, heights.step, below_face);
-            set(&mut from_below, lane, below);
-            set(&mut from_above, lane, above);
-            set(&mut image, lane, ratio);
+            let s = self.lossless.coupling;
+            let (g, image) = match heights.fluids.as_slice() {
+                [one] => {
+                    let g = vertical_wavenumber(k, s, one.sound_speed);
+                    let depth = sampling.upper_echoes.then_some(one.thickness - heights.lowest);
+                    let image = |depth: f64| (-g.scale(2.0 * depth)).exp();
+                    (g, depth.map_or(Complex::default(), image))
+                }
+                _ => {
+                    let waves = FluidWaves::new(&heights.fluids, k, s, sampling.upper_echoes);
+                    let (lowest, first) = (heights.lowest, heights.height(heights.first_in(fluid)));
+                    let wave = waves.at(first);
+                    let start = wave.outwards(first) / waves.at(lowest).outwards(lowest);
+                    set(&mut factors.start, lane, start);
+                    (wave.g, -wave.inwards_ratio(first))
+                }
+            };
+            let [below, above] = height_factors(g, heights.step);
+            set(&mut factors.from_below, lane, below);
+            set(&mut factors.from_above, lane, above);
+            set(&mut factors.image, lane, image);
         }
-        HeightFactors { from_below, from_above, image }
+        factors
     }
-}
-
-/// The contribution of the fluids at one (k, s).
-struct SpectralPoint {
-    g: Complex,
-    load: Complex,
-    /// Twice the factor of (R + 1)/(1 + R E2) in p̂ per unit of F.
-    factor: Complex,
-    echo: Complex,
-}
-
-/// Computes the contribution of the fluids. The pressure in fluid 1, without the direct wave and
-/// its image in the outer face, is, per unit of F,
-///
-/// ```text
-/// ρ1/(2g) e2 (1 - ea) (1 - eb) R / (1 + R E2)
-/// e2 = exp(-g (x3 + x3S)), ea = exp(-2g (h1 - x3)), eb = exp(-2g (h1 - x3S)), E2 = exp(-2g h1)
-/// ```
-///
-/// The mirror wave is the same with R = -1. All of it travels through the coupling by paths longer than
-/// the direct one, and so arrives later. What remains without it is
-///
-/// ```text
-/// ρ1/(2g) e2 (1 - ea) (1 - eb) (R + 1) / ((1 + R E2) (1 - E2))
-/// ```
-///
-/// Elements of a width multiply all of it by their factor ([`ElementAverage`]).
-/// If no reflection of the outer face can arrive in a window, ea, eb and E2 are 0. With a tilted probe x3
-/// is the height of the lowest receiver, and 1 - ea is left to the sum over wavenumbers.
-fn spectral_point(
-    setup: &Setup,
-    heights: &Heights,
-    sampling: &WaveSampling,
-    line: &Line,
-    k: f64,
-) -> SpectralPoint {
-    let coupling = &setup.layers.coupling;
-    let Heights { source, lowest, elements, .. } = *heights;
-    let one = Complex::new(1.0, 0.0);
-    let g = vertical_wavenumber(k, line.lossless.coupling, coupling.sound_speed);
-    let damp = |length: f64| (-g.scale(length)).exp();
-    let mut factor = damp(source + lowest).scale(coupling.density) / g;
-    if let Some(elements) = elements {
-        factor = factor * elements.factor(k, g);
-    }
-    let mut echo = Complex::default();
-    if sampling.upper_echoes {
-        if !heights.are_different() {
-            factor = factor * (one - damp(2.0 * (coupling.thickness - lowest)));
-        }
-        factor = factor * (one - damp(2.0 * (coupling.thickness - source)));
-        echo = damp(2.0 * coupling.thickness);
-        factor = factor / (one - echo);
-    }
-    let load = marrow_load(setup, line.s, &line.lossless, k, sampling.lower_echoes);
-    SpectralPoint { g, load, factor, echo }
-}
-
-/// Returns Z with τ3 = Z u3 at the bone's lower face, divided by m(s) of the bone, Pa/m: Z is
-/// ρ2 s² tanh(g2 h2)/g2, or ρ2 s²/g2 if no reflection of the marrow's outer face can arrive in a window.
-pub(crate) fn marrow_load(
-    setup: &Setup,
-    s: Complex,
-    lossless: &LosslessFrequencies,
-    k: f64,
-    echoes: bool,
-) -> Complex {
-    let marrow = &setup.layers.marrow;
-    let g = vertical_wavenumber(k, lossless.marrow, marrow.sound_speed);
-    let mut load = (s * s).scale(marrow.density) / g;
-    if echoes {
-        let one = Complex::new(1.0, 0.0);
-        let decay = (-g.scale(2.0 * marrow.thickness)).exp();
-        load = load * ((one - decay) / (one + decay));
-    }
-    load * lossless.bone_compliance
-}
-
-/// Returns √(k² + s²/c²), real part > 0; `s` is the fluid's lossless frequency.
-fn vertical_wavenumber(k: f64, s: Complex, c: f64) -> Complex {
-    let over_c = s.scale(1.0 / c);
-    (over_c * over_c + Complex::new(k * k, 0.0)).sqrt()
 }
 
 fn set(lanes: &mut ComplexLanes, lane: usize, value: Complex) {

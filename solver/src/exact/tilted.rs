@@ -31,22 +31,30 @@ impl Kernel for SumTilted<'_> {
         let kept = tables.kept_line(&tables.lines[line]);
         let mut scratch = None;
         for (b, response) in responses.iter().enumerate() {
-            let factors = tables.height_factors(&tables.lines[line], kept, b, &mut scratch);
-            for part in 0..V::PARTS {
-                let from_below = ComplexVector::<V>::load(&factors.from_below, part);
-                let from_above = ComplexVector::<V>::load(&factors.from_above, part);
-                let mut below = ComplexVector::<V>::load(response, part);
-                let mut above = below.mul(ComplexVector::load(&factors.image, part));
-                for r in tables.upwards() {
-                    let cosine = V::load(&tables.cosines(r)[b], part);
-                    let pressure = below.sub(above);
-                    let mut sum = ComplexVector::<V>::load(&sums[r], part);
-                    sum.re = pressure.re.mul_add(cosine, sum.re);
-                    sum.im = pressure.im.mul_add(cosine, sum.im);
-                    sum.store(&mut sums[r], part);
-                    below = below.mul(from_below);
-                    above = above.mul(from_above);
+            let mut first = 0;
+            for (fluid, &end) in tables.receivers_in_fluids().iter().enumerate() {
+                let line = &tables.lines[line];
+                let factors = tables.height_factors(line, kept, b, fluid, &mut scratch);
+                for part in 0..V::PARTS {
+                    let from_below = ComplexVector::<V>::load(&factors.from_below, part);
+                    let from_above = ComplexVector::<V>::load(&factors.from_above, part);
+                    let mut below = ComplexVector::<V>::load(response, part);
+                    if first > 0 {
+                        below = below.mul(ComplexVector::load(&factors.start, part));
+                    }
+                    let mut above = below.mul(ComplexVector::load(&factors.image, part));
+                    for r in tables.upwards(first..end) {
+                        let cosine = V::load(&tables.cosines(r)[b], part);
+                        let pressure = below.sub(above);
+                        let mut sum = ComplexVector::<V>::load(&sums[r], part);
+                        sum.re = pressure.re.mul_add(cosine, sum.re);
+                        sum.im = pressure.im.mul_add(cosine, sum.im);
+                        sum.store(&mut sums[r], part);
+                        below = below.mul(from_below);
+                        above = above.mul(from_above);
+                    }
                 }
+                first = end;
             }
         }
         let (run, lane) = (line / LANES, line % LANES);

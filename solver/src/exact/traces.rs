@@ -1,6 +1,7 @@
 //! Full pressure traces, direct wave included.
 
 use osteon_common::bone::BoneRef;
+use osteon_common::fluid_sublayers::FluidSublayer;
 use osteon_common::limits::SAMPLING_PAIRS_MAX;
 use osteon_common::probe::Place;
 use osteon_common::sampling::{self, WaveSampling, trace_taper};
@@ -9,6 +10,7 @@ use thiserror::Error;
 use crate::complex::Complex;
 use crate::exact::direct;
 use crate::exact::element_average::separations;
+use crate::exact::fluid_spectra::FluidSpectra;
 use crate::exact::plate_stack::PlateStack;
 use crate::exact::response::Spectra;
 use crate::exact::signal::Signal;
@@ -141,7 +143,7 @@ impl Solver {
         let (mut plates, mut spectra) = (PlateStack::<11>::default(), Spectra::default());
         let media = Media::new(self.isa(), bone, self.setup().layers.bone_thickness);
         plates.fill(self.isa(), &media);
-        let coupling = sampling::fastest_in(&self.setup().layers.coupling, self.setup());
+        let coupling = sampling::fastest_in_coupling(self.setup());
         let speed = sampling::fastest(self.setup(), media.fastest()).max(coupling);
         let sampling = WaveSampling::for_traces(self.setup(), speed, duration);
         let pairs = sampling.pairs(sampling.whole_band());
@@ -150,18 +152,19 @@ impl Solver {
         }
         let amplitude = self.setup().probe.amplitude;
         let cut = trace_taper(sampling.whole_band());
-        let tables = Tables::new(self.setup(), sampling, Waves::All, amplitude, cut, None);
+        let waves = if self.only_coupling_fluid().is_some() { Waves::All } else { Waves::Early };
+        let tables = Tables::new(self.setup(), sampling, waves, amplitude, cut, None);
         let taper = tables.taper(cut);
         spectra.clear(&tables);
         spectra.fill(self.isa(), &tables, &media, &mut plates, 0..tables.lines.len());
         let times: Vec<f64> =
             (0..=(samples + 1e-9) as usize).map(|j| j as f64 * time_step).collect();
-        let places = self.setup().probe.places();
-        let pressures: Vec<Vec<f64>> = places
-            .enumerate()
-            .map(|(r, place)| {
-                let mut spectrum = spectra.receiver(r).to_vec();
-                self.add_fluid_waves(place, &tables, &mut spectrum);
+        let mut of_receivers: Vec<_> =
+            (0..tables.receivers()).map(|r| spectra.receiver(r).to_vec()).collect();
+        self.add_fluid_waves(&tables, &mut of_receivers);
+        let pressures: Vec<Vec<f64>> = of_receivers
+            .into_iter()
+            .map(|mut spectrum| {
                 for (run, weights) in spectrum.iter_mut().zip(&taper) {
                     run.re = run.re * *weights;
                     run.im = run.im * *weights;
@@ -177,10 +180,46 @@ impl Solver {
         Ok(Traces { times, pressures })
     }
 
+    /// Returns the fluid above the bone if it is only one.
+    fn only_coupling_fluid(&self) -> Option<FluidSublayer> {
+        match self.setup().layers.coupling_fluids().as_slice() {
+            [one] => Some(*one),
+            _ => None,
+        }
+    }
+
+    /// Adds the waves that do not meet the bone, or see no stiffness there, to the spectra of all receivers.
+    fn add_fluid_waves(&self, tables: &Tables, spectra: &mut [Vec<ComplexLanes>]) {
+        match self.only_coupling_fluid() {
+            Some(only) => {
+                let places = self.setup().probe.places();
+                for (place, spectrum) in places.zip(spectra) {
+                    self.add_direct_wave(&only, place, tables, spectrum);
+                }
+            }
+            None => self.add_waves_of_stack(tables, spectra),
+        }
+    }
+
+    fn add_waves_of_stack(&self, tables: &Tables, spectra: &mut [Vec<ComplexLanes>]) {
+        let stack = FluidSpectra::new(self.setup());
+        for (i, line) in tables.lines.iter().enumerate() {
+            let waves = stack.pressures(&tables.sampling, line).into_iter();
+            for (wave, spectrum) in waves.zip(&mut *spectra) {
+                add(wave * line.pulse, i, spectrum);
+            }
+        }
+    }
+
     /// Adds the direct wave and its image in the coupling's outer face at a receiver's place.
-    fn add_fluid_waves(&self, place: Place, tables: &Tables, spectrum: &mut [ComplexLanes]) {
+    fn add_direct_wave(
+        &self,
+        coupling: &FluidSublayer,
+        place: Place,
+        tables: &Tables,
+        spectrum: &mut [ComplexLanes],
+    ) {
         let setup = self.setup();
-        let coupling = &setup.layers.coupling;
         let source = setup.probe.source.x3;
         let (along, upwards) = setup.probe.element_extent();
         let shortest = coupling.sound_speed / tables.sampling.whole_band();
@@ -198,12 +237,16 @@ impl Solver {
                     - direct::pressure(coupling.density, image, s);
                 sum + wave.scale(weight)
             });
-            let pressure = wave * line.pulse;
-            let run = &mut spectrum[i / LANES];
-            run.re.0[i % LANES] += pressure.re;
-            run.im.0[i % LANES] += pressure.im;
+            add(wave * line.pulse, i, spectrum);
         }
     }
+}
+
+/// Adds a pressure to frequency number `i` of a spectrum.
+fn add(pressure: Complex, i: usize, spectrum: &mut [ComplexLanes]) {
+    let run = &mut spectrum[i / LANES];
+    run.re.0[i % LANES] += pressure.re;
+    run.im.0[i % LANES] += pressure.im;
 }
 
 #[cfg(test)]

@@ -125,12 +125,12 @@ struct SmoothLoadStudy<'a> {
 impl<'a> SmoothLoadStudy<'a> {
     fn new(setup: &'a Setup, bone: &Bone) -> Self {
         let fc = setup.probe.center_frequency;
-        let fluid = 2.0 * std::f64::consts::PI * fc / setup.layers.coupling.sound_speed;
+        let fluid = 2.0 * std::f64::consts::PI * fc / setup.layers.coupling.fastest();
         let mut wavenumbers = Lanes::ZERO;
         for lane in 0..LANES {
             wavenumbers.0[lane] = WAVENUMBER * fluid * lane as f64 / (LANES - 1) as f64;
         }
-        let speed = Medium::new(bone).fastest.max(setup.layers.marrow.sound_speed);
+        let speed = Medium::new(bone).fastest.max(setup.layers.marrow.fastest());
         Self {
             setup,
             bone: BoneRef::from(bone).sublayers(setup.layers.bone_thickness),
@@ -142,13 +142,13 @@ impl<'a> SmoothLoadStudy<'a> {
 
     /// The same elements everywhere.
     fn mesh(&self, order: usize, size: f64) -> Mesh {
-        Mesh::with_sizes(self.setup, &self.bone, &self.scope, order, [size; 2], |_| size)
+        Mesh::with_sizes(self.setup, &self.bone, &self.scope, order, |_| size, |_| size)
     }
 
     /// Returns the largest stable time step, s.
     fn limit(&mut self, mesh: &Mesh) -> f64 {
         Isa::fastest().run(Limit {
-            operator: &Operator::new(self.setup, &self.bone, mesh),
+            operator: &Operator::new(&self.bone, mesh),
             wavenumber: self.wavenumbers.0[LANES - 1],
             state: &mut self.memory.state,
         })
@@ -176,7 +176,7 @@ impl<'a> SmoothLoadStudy<'a> {
         }
         let (node, weights) = mesh.receiver(self.setup.probe.receivers.x3);
         Isa::fastest().run(LoadResponse {
-            operator: &Operator::new(self.setup, &self.bone, mesh),
+            operator: &Operator::new(&self.bone, mesh),
             k: self.wavenumbers,
             times,
             receiver: (node, &weights),

@@ -13,11 +13,16 @@
 //! fluid's outer face adds images of the source where their waves, by way of the bone, can be heard.
 
 use osteon_common::case::Setup;
+use osteon_common::fluid_sublayers::FluidSublayer;
 
-use super::mesh::longest_coupling_path;
+use super::column_load::ColumnLoad;
+use super::mesh::{Mesh, longest_coupling_path};
+use super::operator::FluidColumn;
+use super::plan::Times;
 use super::scope::Scope;
 use crate::lanes::{LANES, Lanes};
 use crate::pulse::Pulse;
+use crate::vector::Vector;
 
 /// Points of interpolation between samples.
 const POINTS: usize = 6;
@@ -27,14 +32,14 @@ const IMAGES_MAX: usize = 64;
 
 /// An image of the source: its height above the bone's face, m, and its sign.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Image {
-    pub(super) height: f64,
-    pub(super) sign: f64,
+struct Image {
+    height: f64,
+    sign: f64,
 }
 
 /// Returns the source, and its images in fluid 1's outer face whose waves can arrive in a window.
-pub(super) fn images(setup: &Setup, scope: &Scope) -> Vec<Image> {
-    let (source, depth) = (setup.probe.source.x3, setup.layers.coupling.thickness);
+fn images(fluid: &FluidSublayer, setup: &Setup, scope: &Scope) -> Vec<Image> {
+    let (source, depth) = (setup.probe.source.x3, fluid.thickness);
     let heard = longest_coupling_path(setup, scope) - setup.probe.receivers.x3;
     let mut images = vec![Image { height: source, sign: 1.0 }];
     let mut sign = -1.0;
@@ -52,7 +57,52 @@ pub(super) fn images(setup: &Setup, scope: &Scope) -> Vec<Image> {
 
 /// Computes the load for one block of wavenumbers after another.
 #[derive(Debug)]
-pub(super) struct Incident {
+pub(super) enum Incident {
+    /// In one fluid, from the time at which the source's wave reaches the face.
+    Images(Box<ImageLoad>),
+    /// In a stack of fluids, from the pulse's start on.
+    Column(Box<ColumnLoad>),
+}
+
+impl Incident {
+    /// Creates the load for the samples and steps of `times`.
+    pub(super) fn new(setup: &Setup, scope: &Scope, mesh: &Mesh, times: Times) -> Self {
+        match setup.layers.coupling_fluids().as_slice() {
+            [one] => Self::Images(Box::new(ImageLoad::new(one, setup, scope, times.sample()))),
+            _ => {
+                let column = FluidColumn::new(&mesh.coupling, &mesh.element);
+                Self::Column(Box::new(ColumnLoad::new(setup, mesh, column, times)))
+            }
+        }
+    }
+
+    /// Returns whether the load is stepped through time, as the bone is.
+    pub(super) fn is_stepped(setup: &Setup) -> bool {
+        setup.layers.coupling_fluids().as_slice().len() > 1
+    }
+
+    /// Returns the time at which the load begins, s, after the start of the pulse.
+    pub(super) fn onset(setup: &Setup) -> f64 {
+        match setup.layers.coupling_fluids().as_slice() {
+            [one] => setup.probe.source.x3 / one.sound_speed,
+            _ => 0.0,
+        }
+    }
+
+    /// Computes the pressure on the face at n steps after the onset, for every n of `load`; `ratio` steps
+    /// make a sample, `k` is in rad/m.
+    #[inline(always)]
+    pub(super) fn fill<V: Vector>(&mut self, k: Lanes, ratio: usize, load: &mut [Lanes]) {
+        match self {
+            Self::Images(images) => images.fill(k, ratio, load),
+            Self::Column(column) => column.fill::<V>(k, load),
+        }
+    }
+}
+
+/// The load in one fluid.
+#[derive(Debug)]
+pub(super) struct ImageLoad {
     /// The images, with the source first.
     images: Vec<Image>,
     sound_speed: f64,
@@ -67,17 +117,17 @@ pub(super) struct Incident {
     table: Vec<Lanes>,
 }
 
-impl Incident {
+impl ImageLoad {
     /// Creates the load for samples `step` (s) apart.
-    pub(super) fn new(setup: &Setup, scope: &Scope, step: f64) -> Self {
+    fn new(fluid: &FluidSublayer, setup: &Setup, scope: &Scope, step: f64) -> Self {
         // A velocity does not depend on the pulse's amplitude, not even in its last bit.
         let pulse = Pulse::new(1.0, &setup.probe);
         let samples = (pulse.extent() / step) as usize + 1;
         let at = |i: usize| i as f64 * step;
         Self {
-            images: images(setup, scope),
-            sound_speed: setup.layers.coupling.sound_speed,
-            density: setup.layers.coupling.density,
+            images: images(fluid, setup, scope),
+            sound_speed: fluid.sound_speed,
+            density: fluid.density,
             step,
             pulse: (0..samples).map(|i| pulse.at(at(i))).collect(),
             pulse_slope: (0..samples).map(|i| pulse.slope_at(at(i))).collect(),
@@ -89,7 +139,7 @@ impl Incident {
     /// Computes the pressure on the face at n substeps after the source's wave has reached it, for
     /// every n of `load`; `ratio` substeps make a step, `k` is in rad/m.
     #[inline(always)]
-    pub(super) fn fill(&mut self, k: Lanes, ratio: usize, load: &mut [Lanes]) {
+    fn fill(&mut self, k: Lanes, ratio: usize, load: &mut [Lanes]) {
         load.fill(Lanes::ZERO);
         let substep = self.step / ratio as f64;
         for i in 0..self.images.len() {

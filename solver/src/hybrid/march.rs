@@ -3,7 +3,7 @@
 use super::incident::Incident;
 use super::operator::Operator;
 use super::plan::{Plan, Times};
-use super::stepping::{WaveState, stability_limit};
+use super::stepping::{WaveState, smooth_start, stability_limit};
 use crate::isa::Kernel;
 use crate::lanes::{LANES, Lanes};
 use crate::vector::Vector;
@@ -20,7 +20,7 @@ impl Kernel for Limit<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> f64 {
-        stability_limit::<V, 1>(self.operator, self.wavenumber, self.state)
+        stability_limit::<V, _>(self.operator, self.wavenumber, self.state)
     }
 }
 
@@ -111,7 +111,7 @@ impl Kernel for March<'_> {
             for lane in 0..LANES {
                 k.0[lane] = (block * LANES + lane) as f64 * self.plan.wavenumber_step;
             }
-            self.incident.fill(k, self.times.ratio, &mut memory.load);
+            self.incident.fill::<V>(k, self.times.ratio, &mut memory.load);
             run_block::<V>(self.operator, k, self.times, (node, &weights), memory);
             for (r, receiver) in self.receivers.iter().enumerate() {
                 let sums = &mut memory.pressures[r * samples..(r + 1) * samples];
@@ -135,7 +135,7 @@ fn run_block<V: Vector>(
 ) {
     let load = &memory.load;
     let state = &mut memory.state;
-    state.start::<V, 1>(operator, k, [load[1], load[2]], times.step);
+    state.start::<V, _>(operator, k, smooth_start([load[1], load[2]]), times.step);
     for n in 1..times.samples * times.ratio {
         if n.is_multiple_of(times.ratio) {
             let mut pressure = Lanes::ZERO;
@@ -144,7 +144,7 @@ fn run_block<V: Vector>(
             }
             memory.record[n / times.ratio] = pressure;
         }
-        state.step::<V, 1>(operator, k, [load[n - 1], load[n], load[n + 1]], times.step);
+        state.step::<V, _>(operator, k, [load[n - 1], load[n], load[n + 1]], times.step);
     }
 }
 
@@ -193,8 +193,8 @@ mod tests {
         setup.probe.receivers.first_x1 = 0.1;
         setup.layers.marrow.thickness = 4e-3;
         let scope = Scope::until_direct_wave(&setup, 5000.0);
-        let mesh = Mesh::with_sizes(&setup, bone, &scope, 8, [0.4e-3; 2], |_| 0.4e-3);
-        let operator = Operator::<1>::new(&setup, bone, &mesh);
+        let mesh = Mesh::with_sizes(&setup, bone, &scope, 8, |_| 0.4e-3, |_| 0.4e-3);
+        let operator = Operator::<1>::new(bone, &mesh);
         let step = 5e-9;
         // Echoes from the coupling's outer face after 13 µs are weakened by e^-25.
         let (damping, samples) = (1.9e6, 2600);

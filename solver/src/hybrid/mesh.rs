@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 
 use osteon_common::bone::{Bone, Sublayer, Sublayers};
 use osteon_common::case::Setup;
+use osteon_common::fluid_sublayers::{FluidSublayer, FluidSublayers};
 use osteon_common::sampling::slowness;
 
 use super::element::Element;
@@ -33,14 +34,23 @@ pub(super) struct LayerMesh {
     pub(super) size: f64,
 }
 
+/// A fluid, as far as it is meshed, with its elements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FluidMesh {
+    pub(super) fluid: FluidSublayer,
+    pub(super) mesh: LayerMesh,
+}
+
 /// The mesh of one bone between its fluids.
 #[derive(Debug, Clone)]
 pub(super) struct Mesh {
     pub(super) element: Element,
-    pub(super) coupling: LayerMesh,
+    /// The fluids above the bone, upwards.
+    pub(super) coupling: Vec<FluidMesh>,
     /// The bone's sublayers, downwards.
     pub(super) bone: Vec<LayerMesh>,
-    pub(super) marrow: LayerMesh,
+    /// The fluids below the bone, upwards.
+    pub(super) marrow: Vec<FluidMesh>,
 }
 
 impl LayerMesh {
@@ -60,37 +70,43 @@ impl Mesh {
             let share = (slowest / frequency / WAVELENGTH).min(1.0);
             setup.solver.element_size * share / finer
         };
-        let fluids =
-            [size(setup.layers.coupling.sound_speed), size(setup.layers.marrow.sound_speed)];
+        let in_fluid = |fluid: &FluidSublayer| size(fluid.sound_speed);
         let in_solid = |solid: &Bone| size(sublayer_speed(setup, solid));
         let order = setup.solver.element_order as usize;
-        Self::with_sizes(setup, bone, scope, order, fluids, in_solid)
+        Self::with_sizes(setup, bone, scope, order, in_fluid, in_solid)
     }
 
-    /// Creates a mesh of elements of degree `order`, none larger than `fluids` (m) in fluid 1 and fluid 2,
-    /// and what `in_solid` returns (m) in the solids of the bone.
+    /// Creates a mesh of elements of degree `order`, none larger than what `in_fluid` returns (m) in the
+    /// fluids, and `in_solid` (m) in the solids of the bone.
     pub(super) fn with_sizes(
         setup: &Setup,
         bone: &Sublayers,
         scope: &Scope,
         order: usize,
-        fluids: [f64; 2],
+        in_fluid: impl Fn(&FluidSublayer) -> f64,
         in_solid: impl Fn(&Bone) -> f64,
     ) -> Self {
-        let [coupling, marrow] = fluids;
+        let fluid = |&fluid: &FluidSublayer| FluidMesh {
+            fluid,
+            mesh: LayerMesh::new(fluid.thickness, in_fluid(&fluid)),
+        };
+        let fluids = |all: FluidSublayers| all.as_slice().iter().map(fluid).collect();
+        let (above, below) = (setup.layers.coupling_fluids(), setup.layers.marrow_fluids());
+        let least = below.as_slice().first().map_or(0.0, &in_fluid);
         let sublayer = |one: &Sublayer| LayerMesh::new(one.thickness, in_solid(&one.solid));
         Self {
             element: Element::new(order),
-            coupling: LayerMesh::new(coupling_depth(setup, scope), coupling),
+            coupling: fluids(above.between(0.0, coupling_depth(setup, scope))),
             bone: bone.iter().map(sublayer).collect(),
-            marrow: LayerMesh::new(marrow_depth(setup, scope, marrow), marrow),
+            marrow: fluids(below.between(0.0, marrow_depth(setup, scope, least)).reversed()),
         }
     }
 
     /// Returns the number of elements of all layers.
     pub(super) fn elements(&self) -> usize {
         let bone: usize = self.bone.iter().map(|sublayer| sublayer.elements).sum();
-        self.coupling.elements + bone + self.marrow.elements
+        let fluids = self.coupling.iter().chain(&self.marrow);
+        bone + fluids.map(|fluid| fluid.mesh.elements).sum::<usize>()
     }
 
     /// Returns the largest relative error of the speed of waves at the centre frequency on this
@@ -115,24 +131,31 @@ impl Mesh {
         let of_bone = self.bone.iter().zip(bone.iter()).fold(0.0, |largest: f64, (mesh, one)| {
             largest.max(error(mesh, sublayer_speed(setup, &one.solid)))
         });
-        error(&self.coupling, setup.layers.coupling.sound_speed)
-            .max(of_bone)
-            .max(error(&self.marrow, setup.layers.marrow.sound_speed))
+        let fluids = self.coupling.iter().chain(&self.marrow);
+        fluids.fold(of_bone, |largest, one| largest.max(error(&one.mesh, one.fluid.sound_speed)))
     }
 
     /// Node and weights by which the pressure at height `x3` (m) in fluid 1 is interpolated.
     pub(super) fn receiver(&self, x3: f64) -> (usize, Vec<f64>) {
-        let mesh = &self.coupling;
-        let e = ((x3 / mesh.size) as usize).min(mesh.elements - 1);
-        let local = 2.0 * (x3 / mesh.size - e as f64) - 1.0;
-        (e * (self.element.count() - 1), self.element.polynomials_at(local))
+        let (mut node, mut x3, order) = (0, x3, self.element.count() - 1);
+        let mut fluids = self.coupling.iter().peekable();
+        while let Some(FluidMesh { fluid, mesh }) = fluids.next() {
+            if x3 <= fluid.thickness || fluids.peek().is_none() {
+                let e = ((x3 / mesh.size) as usize).min(mesh.elements - 1);
+                let local = 2.0 * (x3 / mesh.size - e as f64) - 1.0;
+                return (node + e * order, self.element.polynomials_at(local));
+            }
+            node += mesh.elements * order + 1;
+            x3 -= fluid.thickness;
+        }
+        (node, Vec::new())
     }
 }
 
 /// Returns the longest path, m, across the coupling fluid on which a wave can arrive within its
 /// window.
 pub(super) fn longest_coupling_path(setup: &Setup, scope: &Scope) -> f64 {
-    scope.longest_time_across() / slowness(setup.layers.coupling.sound_speed, scope.speed)
+    scope.longest_time_across() / slowness(setup.layers.coupling.fastest(), scope.speed)
 }
 
 /// Returns the speed, m/s, of the waves for which elements in a sublayer of the bone are made.
@@ -140,22 +163,30 @@ pub(super) fn longest_coupling_path(setup: &Setup, scope: &Scope) -> f64 {
 /// If shear waves in it are slower than sound in the coupling fluid, it is the geometric mean
 /// of the two: the slowest waves contribute little to the first arrival.
 fn sublayer_speed(setup: &Setup, solid: &Bone) -> f64 {
-    (setup.layers.coupling.sound_speed * Medium::new(solid).slowest_across()).sqrt()
+    let fluids = setup.layers.coupling_fluids();
+    let on_face = fluids.as_slice().first().map_or(0.0, |fluid| fluid.sound_speed);
+    (on_face * Medium::new(solid).slowest_across()).sqrt()
 }
 
 /// Returns the depth of fluid 1 that is meshed, m: the wave goes from the source to the bone, then
-/// up to the cut and down to the receiver.
+/// up to the cut and down to the receiver. In a stack, the source's wave is stepped through the mesh, too,
+/// and may come to the bone by way of the cut.
 fn coupling_depth(setup: &Setup, scope: &Scope) -> f64 {
     let (source, receivers) = (setup.probe.source.x3, setup.probe.receivers.x3);
-    let heard = 0.5 * (longest_coupling_path(setup, scope) + receivers - source);
-    (DEPTH_MARGIN * heard.max(receivers)).min(setup.layers.coupling.thickness)
+    let higher = receivers - source;
+    let (higher, least) = match setup.layers.coupling_fluids().as_slice() {
+        [_] => (higher, receivers),
+        _ => (higher.abs(), receivers.max(source)),
+    };
+    let heard = 0.5 * (longest_coupling_path(setup, scope) + higher);
+    (DEPTH_MARGIN * heard.max(least)).min(setup.layers.coupling.whole_thickness())
 }
 
 /// Returns the depth of fluid 2 that is meshed, m; at least one element of `size`.
 fn marrow_depth(setup: &Setup, scope: &Scope, size: f64) -> f64 {
     let marrow = &setup.layers.marrow;
-    let heard = 0.5 * scope.longest() / slowness(marrow.sound_speed, scope.speed);
-    (DEPTH_MARGIN * heard).max(size).min(marrow.thickness)
+    let heard = 0.5 * scope.longest() / slowness(marrow.fastest(), scope.speed);
+    (DEPTH_MARGIN * heard).max(size).min(marrow.whole_thickness())
 }
 
 #[cfg(test)]
@@ -201,7 +232,7 @@ mod tests {
                 mesh.bone,
                 [LayerMesh { elements: elements as usize, size: 4e-3 / elements }]
             );
-            assert!((mesh.coupling.size / 0.5e-3 - 1.0).abs() < 0.1);
+            assert!((mesh.coupling[0].mesh.size / 0.5e-3 - 1.0).abs() < 0.1);
         }
     }
 
@@ -223,7 +254,9 @@ mod tests {
         let mesh = Mesh::new(&setup, &whole(&bone()), &scope, 1.0);
         // By hand, at the farthest receiver: (14.267 - 5.404) µs / 616.99 µs/m is a path of
         // 14.36 mm, half of it 7.18 mm; below, (14.267 - 5.404 - 2.468) µs leaves 5.18 mm.
-        let depth = |mesh: &LayerMesh| mesh.elements as f64 * mesh.size;
+        let depth = |fluids: &[FluidMesh]| {
+            fluids.iter().fold(0.0, |sum, one| sum + one.mesh.elements as f64 * one.mesh.size)
+        };
         assert!((depth(&mesh.coupling) - 1.02 * 7.182e-3).abs() < 1e-5);
         assert!((depth(&mesh.marrow) - 1.02 * 5.182e-3).abs() < 1e-5);
         // Thin fluids are meshed whole.

@@ -23,22 +23,26 @@
 //! them comparable with pressures.
 
 mod axes;
+mod column;
 mod fluid;
+mod fluid_stack;
 mod halves;
 mod interface;
 mod shared_node;
 mod sink;
 mod solid;
+mod system;
 
 use osteon_common::bone::{Sublayer, Sublayers};
-use osteon_common::case::Setup;
 
-use self::fluid::FluidLayer;
+pub(super) use self::column::FluidColumn;
+use self::fluid_stack::FluidStack;
 use self::interface::Interface;
 pub(super) use self::sink::{Keep, Sink};
 use self::solid::SolidLayer;
 pub(super) use self::solid::{SOLID, Scratch};
-use super::mesh::Mesh;
+pub(super) use self::system::System;
+use super::mesh::{FluidMesh, Mesh};
 use crate::lanes::Lanes;
 use crate::vector::Vector;
 
@@ -47,28 +51,27 @@ const MARROW: usize = 2;
 /// A length by which displacements are scaled, m.
 const LENGTH: f64 = 1e-3;
 
-/// The operator A of one bone. A state consists of fluid 1, solid, fluid 2, each by ascending x3. Each
-/// sublayer of the solid has nodes of its own on both faces.
+/// The operator A of one bone, loaded by a pressure on its upper face. A state consists of fluid 1, solid,
+/// fluid 2, each by ascending x3. Each sublayer of any of them has nodes of its own on both faces.
 ///
 /// `COUPLING` is the number of real numbers per node of fluid 1: its pressure is even in x1, so 1,
 /// its real part, is sufficient; with 2 the imaginary part is computed, and comes out as zero.
 #[derive(Debug, Clone)]
 pub(super) struct Operator<const COUPLING: usize> {
-    coupling: FluidLayer,
+    coupling: FluidStack,
     /// The lowest sublayer of the bone.
     lowest: SolidLayer,
     /// Those above it, upwards, each with what is below it.
     upper: Vec<(Interface, SolidLayer)>,
-    marrow: FluidLayer,
+    marrow: FluidStack,
 }
 
 impl<const COUPLING: usize> Operator<COUPLING> {
-    pub(super) fn new(setup: &Setup, bone: &Sublayers, mesh: &Mesh) -> Self {
+    pub(super) fn new(bone: &Sublayers, mesh: &Mesh) -> Self {
         let element = &mesh.element;
-        let scale = setup.layers.coupling.density
-            * setup.layers.coupling.sound_speed
-            * setup.layers.coupling.sound_speed
-            / LENGTH;
+        let modulus =
+            |one: &FluidMesh| one.fluid.density * one.fluid.sound_speed * one.fluid.sound_speed;
+        let scale = mesh.coupling.first().map_or(0.0, modulus) / LENGTH;
         let solid =
             |sublayer: &Sublayer, mesh| SolidLayer::new(&sublayer.solid, mesh, element, scale);
         // Sublayers are listed downwards.
@@ -80,26 +83,19 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         }
         upper.reverse();
         Self {
-            coupling: FluidLayer::new(&setup.layers.coupling, &mesh.coupling, element, scale),
+            coupling: FluidStack::new(&mesh.coupling, element, scale),
             lowest,
             upper,
-            marrow: FluidLayer::new(&setup.layers.marrow, &mesh.marrow, element, scale),
+            marrow: FluidStack::new(&mesh.marrow, element, scale),
         }
-    }
-
-    /// Returns the number of real numbers (in each lane) of a state.
-    pub(super) fn len(&self) -> usize {
-        let (coupling, solid, marrow) = self.lengths();
-        coupling + solid + marrow
     }
 
     /// Returns the number of real numbers of fluid 1, solid, fluid 2.
     pub(super) fn lengths(&self) -> (usize, usize, usize) {
-        let nodes = |elements: usize, count: usize| elements * (count - 1) + 1;
         (
-            nodes(self.coupling.elements, self.coupling.count) * COUPLING,
+            self.coupling.nodes() * COUPLING,
             self.sublayers().map(|(_, sublayer)| sublayer.len()).sum(),
-            nodes(self.marrow.elements, self.marrow.count) * MARROW,
+            self.marrow.nodes() * MARROW,
         )
     }
 
@@ -109,11 +105,16 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         let upper = self.upper.iter().map(|(interface, sublayer)| (Some(interface), sublayer));
         [(None, &self.lowest)].into_iter().chain(upper)
     }
+}
 
-    /// Computes `out` = A `x` + the effect of the pressure `load` on the upper face; `sink`
-    /// receives every number of it once, as soon as it is final.
+impl<const COUPLING: usize> System for Operator<COUPLING> {
+    fn len(&self) -> usize {
+        let (coupling, solid, marrow) = self.lengths();
+        coupling + solid + marrow
+    }
+
     #[inline(always)]
-    pub(super) fn apply<V: Vector, S: Sink>(
+    fn apply<V: Vector, S: Sink>(
         &self,
         k: Lanes,
         x: &[Lanes],
@@ -152,7 +153,7 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         sink.take::<V>(coupling + top, &u_out[top..]);
 
         self.coupling.apply::<COUPLING, V, S>(k, p1, p1_out, 0, sink);
-        let drive = Lanes::splat(self.coupling.drive);
+        let drive = Lanes::splat(self.coupling.lower_drive());
         let moved = uppermost.component_across(&u_out[top..]);
         for c in 0..COUPLING {
             p1_out[c] = drive.mul_add(moved[c], p1_out[c]);
@@ -161,7 +162,7 @@ impl<const COUPLING: usize> Operator<COUPLING> {
         sink.take::<V>(0, &p1_out[..COUPLING]);
 
         self.marrow.apply::<MARROW, V, S>(k, p2, p2_out, coupling + solid, sink);
-        let drive = Lanes::splat(-self.marrow.drive);
+        let drive = Lanes::splat(-self.marrow.upper_drive());
         let moved = lowest.component_across(&u_out[..SOLID]);
         for c in 0..MARROW {
             p2_out[face + c] = drive.mul_add(moved[c], p2_out[face + c]);

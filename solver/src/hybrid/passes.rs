@@ -4,9 +4,10 @@ use osteon_common::bone::Sublayers;
 use osteon_common::case::Setup;
 use osteon_common::outcome::FailureKind;
 
+use super::column_load::ColumnLimit;
 use super::incident::Incident;
 use super::march::{Limit, March, MarchWorkspace, ReceiverSamples};
-use super::operator::Operator;
+use super::operator::{FluidColumn, Operator};
 use super::plan::{Plan, SAMPLES_BEYOND, Times, WorkBudget, thinness};
 use super::samples::{LowPass, Samples};
 use super::scope::{Scope, Span};
@@ -175,18 +176,25 @@ impl Passes<'_> {
     fn march(&mut self, finer: f64, scope: &Scope) -> Result<(Times, f64), Failure> {
         let setup = self.setup;
         let plan = Plan::new(setup, self.bone, scope, finer)?;
-        let operator = Operator::new(setup, self.bone, &plan.mesh);
-        let limit = self.isa.run(Limit {
+        let operator = Operator::new(self.bone, &plan.mesh);
+        let mut limit = self.isa.run(Limit {
             operator: &operator,
             wavenumber: plan.wavenumber_limit,
             state: &mut self.memory.state,
         });
+        if Incident::is_stepped(setup) {
+            limit = limit.min(self.isa.run(ColumnLimit {
+                column: &FluidColumn::new(&plan.mesh.coupling, &plan.mesh.element),
+                wavenumber: plan.wavenumber_limit,
+                state: &mut self.memory.state,
+            }));
+        }
         let share = self.share(limit)?;
         let times = plan.times(setup, self.onset(), limit, share, &mut self.budget)?;
         let filter = LowPass::new(plan.band * times.sample());
         let receivers: Vec<ReceiverSamples> =
             scope.windows.iter().map(|span| self.receiver(span, times, filter.reach())).collect();
-        let mut incident = Incident::new(setup, scope, times.sample());
+        let mut incident = Incident::new(setup, scope, &plan.mesh, times);
         let finite = self.isa.run(March {
             operator: &operator,
             plan: &plan,
@@ -237,10 +245,9 @@ impl Passes<'_> {
         Ok(share)
     }
 
-    /// Returns the time at which the source's wave reaches the bone, s, when the computation
-    /// begins.
+    /// Returns the time, s, when the computation begins.
     fn onset(&self) -> f64 {
-        self.setup.probe.source.x3 / self.setup.layers.coupling.sound_speed
+        Incident::onset(self.setup)
     }
 
     /// Returns the samples that a window needs with a filter of this `reach`.

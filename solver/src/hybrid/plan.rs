@@ -9,7 +9,7 @@ use osteon_common::outcome::FailureKind;
 use osteon_common::probe::Place;
 use osteon_common::sampling::{earliest_arrival, nearest_and_farthest, smooth_step};
 
-use super::mesh::Mesh;
+use super::mesh::{FluidMesh, Mesh};
 use super::scope::Scope;
 use crate::failure::Failure;
 use crate::lanes::LANES;
@@ -129,12 +129,17 @@ impl Plan {
         let above = Place { x: 0.0, x3: setup.probe.receivers.x3 };
         let length =
             farthest + scope.speed * (end - earliest_arrival(setup, above, scope.speed)) + heights;
-        let sound_speed = setup.layers.coupling.sound_speed;
-        let propagating = 2.0 * PI * BAND * setup.probe.band_unit() / sound_speed;
+        let fluids = setup.layers.coupling_fluids();
+        let speeds = fluids.as_slice().iter().map(|fluid| fluid.sound_speed);
+        let slowest = speeds.fold(f64::INFINITY, f64::min);
+        let propagating = 2.0 * PI * BAND * setup.probe.band_unit() / slowest;
         let evanescent = EVANESCENCE / heights;
-        let spacing = mesh.coupling.size / (mesh.element.count() - 1) as f64;
+        let band = |one: &FluidMesh| {
+            let spacing = one.mesh.size / (mesh.element.count() - 1) as f64;
+            one.fluid.sound_speed / (NODES_PER_WAVELENGTH * spacing)
+        };
         Ok(Self {
-            band: sound_speed / (NODES_PER_WAVELENGTH * spacing),
+            band: mesh.coupling.iter().map(band).fold(f64::INFINITY, f64::min),
             mesh,
             wavenumber_step: 2.0 * PI / length,
             wavenumber_limit: wavenumber_fineness(setup, finer)

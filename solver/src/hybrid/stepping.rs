@@ -6,7 +6,7 @@
 //!
 //! stable while Δ √λ < √12 for the largest eigenvalue λ of -A.
 
-use super::operator::{Keep, Operator, Scratch, Sink};
+use super::operator::{Keep, Scratch, Sink, System};
 use crate::lanes::{LANES, Lanes};
 use crate::vector::Vector;
 
@@ -19,8 +19,8 @@ pub(super) const STABLE_SHARE: f64 = 0.98;
 
 /// The largest stable time step, s, at wavenumber `k` (rad/m).
 #[inline(always)]
-pub(super) fn stability_limit<V: Vector, const COUPLING: usize>(
-    operator: &Operator<COUPLING>,
+pub(super) fn stability_limit<V: Vector, A: System>(
+    operator: &A,
     k: f64,
     state: &mut WaveState,
 ) -> f64 {
@@ -55,6 +55,14 @@ pub(super) fn stability_limit<V: Vector, const COUPLING: usize>(
     STABLE_SHARE * (12.0 / largest).sqrt()
 }
 
+/// Returns the mean for [`WaveState::start`] of a load that starts as t² or more smoothly; `load` contains
+/// its values at 1 and 2 steps.
+#[inline(always)]
+pub(super) fn smooth_start(load: [Lanes; 2]) -> Lanes {
+    // ∫∫ of a load α t² + β t³ over one step, from its values.
+    Lanes::splat(7.0 / 60.0).mul_add(load[0], Lanes::splat(-1.0 / 120.0) * load[1])
+}
+
 /// The state at two neighbouring times of eight wavenumbers, and scratch memory.
 #[derive(Debug, Default)]
 pub(super) struct WaveState {
@@ -67,7 +75,7 @@ pub(super) struct WaveState {
 
 impl WaveState {
     /// Sets everything to rest.
-    pub(super) fn reset<const COUPLING: usize>(&mut self, operator: &Operator<COUPLING>) {
+    pub(super) fn reset(&mut self, operator: &impl System) {
         let len = operator.len();
         for vector in [&mut self.now, &mut self.before, &mut self.first, &mut self.second] {
             vector.clear();
@@ -75,19 +83,17 @@ impl WaveState {
         }
     }
 
-    /// Steps from rest at t = 0 to t = `step` under a load that starts as t² or more smoothly;
-    /// `load` contains its values at 1 and 2 steps.
+    /// Steps from rest at t = 0 to t = `step` under a load whose ∫∫ over the step is `mean` times the
+    /// square of the step.
     #[inline(always)]
-    pub(super) fn start<V: Vector, const COUPLING: usize>(
+    pub(super) fn start<V: Vector, A: System>(
         &mut self,
-        operator: &Operator<COUPLING>,
+        operator: &A,
         k: Lanes,
-        load: [Lanes; 2],
+        mean: Lanes,
         step: f64,
     ) {
         self.reset(operator);
-        // ∫∫ of a load α t² + β t³ over one step, from its values.
-        let mean = Lanes::splat(7.0 / 60.0).mul_add(load[0], Lanes::splat(-1.0 / 120.0) * load[1]);
         let out = &mut self.first;
         operator.apply::<V, Keep>(k, &self.before, mean, &mut self.scratch, out, &mut Keep);
         let square = Lanes::splat(step * step);
@@ -98,9 +104,9 @@ impl WaveState {
 
     /// Makes one step; `load` contains the load's values one step before, now, and one step after.
     #[inline(always)]
-    pub(super) fn step<V: Vector, const COUPLING: usize>(
+    pub(super) fn step<V: Vector, A: System>(
         &mut self,
-        operator: &Operator<COUPLING>,
+        operator: &A,
         k: Lanes,
         load: [Lanes; 3],
         step: f64,

@@ -1,6 +1,7 @@
 //! Random specifications, all of them valid.
 
 use osteon_common::case::Setup;
+use osteon_common::fluid_sublayers::{FluidSublayer, FluidSublayers};
 use osteon_common::job::{
     PosteriorPrior, PosteriorSettings, PriorDistribution, Sampling, SearchMethod,
 };
@@ -191,7 +192,18 @@ fn layered() -> impl Strategy<Value = Setup> {
             time_step,
         },
     );
-    let hybrid = hybrid.prop_map(|solver| Setup { solver, ..Setup::default() });
+    let hybrid = hybrid.prop_map(|solver| {
+        let mut setup = Setup { solver, ..Setup::default() };
+        let sublayer = |i: u32| FluidSublayer {
+            thickness: 2e-3,
+            density: 950.0 + f64::from(i),
+            sound_speed: 1450.0,
+        };
+        // One to four.
+        let sublayers: Vec<_> = (0..=solver.element_order % 4).map(sublayer).collect();
+        setup.layers.marrow.sublayers = FluidSublayers::new(&sublayers).unwrap_or_default();
+        setup
+    });
     prop_oneof![exact, hybrid]
 }
 

@@ -1,6 +1,6 @@
 //! Contribution of one fluid to the operator.
 
-use osteon_common::layers::Fluid;
+use osteon_common::fluid_sublayers::FluidSublayer;
 
 use super::halves::{HALF, Halves};
 use super::shared_node::average;
@@ -13,9 +13,9 @@ use crate::vector::Vector;
 /// -c² (E D / J + k²) in every element of a fluid.
 #[derive(Debug, Clone)]
 pub(super) struct FluidLayer {
-    pub(super) elements: usize,
+    elements: usize,
     /// Nodes of one element.
-    pub(super) count: usize,
+    count: usize,
     /// Half of -c² E D / J, as the even and odd part of its result are added and subtracted.
     stiffness: Halves,
     /// Half of -c², (m/s)².
@@ -25,7 +25,12 @@ pub(super) struct FluidLayer {
 }
 
 impl FluidLayer {
-    pub(super) fn new(fluid: &Fluid, mesh: &LayerMesh, element: &Element, scale: f64) -> Self {
+    pub(super) fn new(
+        fluid: &FluidSublayer,
+        mesh: &LayerMesh,
+        element: &Element,
+        scale: f64,
+    ) -> Self {
         let half = 0.5 * mesh.size;
         let square = fluid.sound_speed * fluid.sound_speed;
         let stiffness = element.stiffness(half);
@@ -36,6 +41,11 @@ impl FluidLayer {
             diagonal: -0.5 * square,
             drive: fluid.density * square / (element.weights[0] * half * scale),
         }
+    }
+
+    /// Returns the number of nodes.
+    pub(super) fn nodes(&self) -> usize {
+        self.elements * (self.count - 1) + 1
     }
 
     /// Computes `out` from `p`, with `C` numbers per node; the first of them is at `offset` in a

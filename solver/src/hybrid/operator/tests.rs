@@ -1,6 +1,6 @@
 use osteon_common::bone::{Bone, BoneRef};
 use osteon_common::case::Setup;
-use osteon_common::layers::Fluid;
+use osteon_common::fluid_sublayers::{FluidSublayer, FluidSublayers};
 use osteon_common::parameters::Point;
 use osteon_common::realization::Ensemble;
 
@@ -8,7 +8,7 @@ use super::*;
 use crate::hybrid::element::Element;
 use crate::hybrid::mesh::LayerMesh;
 use crate::hybrid::scope::Scope;
-use crate::hybrid::stepping::{WaveState, stability_limit};
+use crate::hybrid::stepping::{WaveState, smooth_start, stability_limit};
 use crate::lanes::LANES;
 use crate::vector::Scalar;
 
@@ -22,18 +22,27 @@ fn whole() -> Sublayers {
     BoneRef::from(&bone()).sublayers(4e-3)
 }
 
-/// Two unlike fluids, and layers of unlike elements.
+fn fluids(all: &[(f64, f64, f64)]) -> FluidSublayers {
+    let one =
+        |&(thickness, density, sound_speed)| FluidSublayer { thickness, density, sound_speed };
+    FluidSublayers::new(&all.iter().map(one).collect::<Vec<_>>()).unwrap()
+}
+
+/// Unlike fluids, three above the bone and two below it, and layers of unlike elements.
 fn setup() -> Setup {
     let mut setup = Setup::default();
-    setup.layers.marrow =
-        Fluid { thickness: 3e-3, density: 930.0, sound_speed: 1440.0, ..setup.layers.marrow };
-    setup.layers.coupling.thickness = 5e-3;
+    let above = [(1.5e-3, 1000.0, 1500.0), (1e-3, 930.0, 1440.0), (2.5e-3, 1060.0, 1570.0)];
+    setup.layers.coupling.sublayers = fluids(&above);
+    setup.layers.marrow.sublayers = fluids(&[(2e-3, 930.0, 1440.0), (1e-3, 1040.0, 1530.0)]);
     setup
 }
 
 fn mesh() -> Mesh {
     let scope = Scope::until_direct_wave(&setup(), 4500.0);
-    Mesh::with_sizes(&setup(), &whole(), &scope, 6, [0.7e-3, 0.8e-3], |_| 0.9e-3)
+    {
+        let in_fluid = |fluid: &FluidSublayer| if fluid.density < 1000.0 { 0.8e-3 } else { 0.7e-3 };
+        Mesh::with_sizes(&setup(), &whole(), &scope, 6, in_fluid, |_| 0.9e-3)
+    }
 }
 
 fn wavenumbers() -> Lanes {
@@ -53,6 +62,16 @@ fn noise<const C: usize>(operator: &Operator<C>, seed: u64) -> Vec<Lanes> {
     let (coupling, solid, _) = operator.lengths();
     x[coupling - C..coupling].fill(Lanes::ZERO);
     x[coupling + solid..coupling + solid + MARROW].fill(Lanes::ZERO);
+    // Both nodes on a joint of two fluids have one pressure.
+    let (mesh, order) = (mesh(), mesh().element.count() - 1);
+    for (fluids, from, c) in [(&mesh.coupling, 0, C), (&mesh.marrow, coupling + solid, MARROW)] {
+        let mut node = 0;
+        for lower in &fluids[..fluids.len() - 1] {
+            node += lower.mesh.elements * order + 1;
+            let joint = from + node * c;
+            x.copy_within(joint - c..joint, joint);
+        }
+    }
     x
 }
 
@@ -78,16 +97,13 @@ fn masses(mesh: &LayerMesh, element: &Element, factor: f64) -> Vec<f64> {
 /// The inner product diag(Ks, Mf), lane by lane: the solid's own stiffness, taken from the operator
 /// with no pressure, and the fluids' masses.
 fn inner<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes], y: &[Lanes]) -> Lanes {
-    let (setup, mesh, bone) = (setup(), mesh(), bone());
+    let (mesh, bone) = (mesh(), bone());
     let (coupling, solid, _) = operator.lengths();
     let mut u = y.to_vec();
     u[..coupling].fill(Lanes::ZERO);
     u[coupling + solid..].fill(Lanes::ZERO);
     let forces = apply(operator, k, &u);
-    let scale = setup.layers.coupling.density
-        * setup.layers.coupling.sound_speed
-        * setup.layers.coupling.sound_speed
-        / LENGTH;
+    let scale = 1060.0 * 1570.0 * 1570.0 / LENGTH;
     let mut sum = Lanes::ZERO;
     let mut add = |i: usize, mass: f64, with: Lanes| {
         sum = (Lanes::splat(mass) * x[i]).mul_add(with, sum);
@@ -100,12 +116,12 @@ fn inner<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes], y: &[Lan
             add(i, mass, -forces[i]);
         }
     }
-    for (fluid, layer, from, c) in [
-        (&setup.layers.coupling, &mesh.coupling, 0, C),
-        (&setup.layers.marrow, &mesh.marrow, coupling + solid, MARROW),
-    ] {
-        let factor = 1.0 / (fluid.density * fluid.sound_speed * fluid.sound_speed);
-        for (node, &mass) in masses(layer, &mesh.element, factor).iter().enumerate() {
+    for (fluids, from, c) in [(&mesh.coupling, 0, C), (&mesh.marrow, coupling + solid, MARROW)] {
+        let of_fluid = |FluidMesh { fluid, mesh: layer }: &FluidMesh| {
+            let factor = 1.0 / (fluid.density * fluid.sound_speed * fluid.sound_speed);
+            masses(layer, &mesh.element, factor)
+        };
+        for (node, mass) in fluids.iter().flat_map(of_fluid).enumerate() {
             for i in from + node * c..from + (node + 1) * c {
                 add(i, mass, y[i]);
             }
@@ -116,7 +132,7 @@ fn inner<const C: usize>(operator: &Operator<C>, k: Lanes, x: &[Lanes], y: &[Lan
 
 #[test]
 fn the_operator_is_self_adjoint_and_not_positive() {
-    let operator = Operator::<2>::new(&setup(), &whole(), &mesh());
+    let operator = Operator::<2>::new(&whole(), &mesh());
     let k = wavenumbers();
     let (x, y) = (noise(&operator, 1), noise(&operator, 2));
     let one = inner(&operator, k, &x, &apply(&operator, k, &y));
@@ -130,7 +146,7 @@ fn the_operator_is_self_adjoint_and_not_positive() {
 
 #[test]
 fn energy_without_source_is_conserved() {
-    let operator = Operator::<2>::new(&setup(), &whole(), &mesh());
+    let operator = Operator::<2>::new(&whole(), &mesh());
     let k = wavenumbers();
     let mut state = WaveState::default();
     let step = 0.9 * stability_limit::<Scalar, _>(&operator, k.0[LANES - 1], &mut state);
@@ -166,7 +182,7 @@ fn energy_without_source_is_conserved() {
 
 /// Drives the bone's face by a smooth load; the states of fluid 1 at the end.
 fn drive_face<const C: usize>() -> Vec<Lanes> {
-    let operator = Operator::<C>::new(&setup(), &whole(), &mesh());
+    let operator = Operator::<C>::new(&whole(), &mesh());
     let k = wavenumbers();
     let mut state = WaveState::default();
     let step = stability_limit::<Scalar, _>(&operator, k.0[LANES - 1], &mut state);
@@ -174,7 +190,7 @@ fn drive_face<const C: usize>() -> Vec<Lanes> {
         let t = n as f64 * step / 0.3e-6 - 6.1;
         Lanes::splat(libm::exp(-t * t))
     };
-    state.start::<Scalar, _>(&operator, k, [load(1), load(2)], step);
+    state.start::<Scalar, _>(&operator, k, smooth_start([load(1), load(2)]), step);
     for n in 1..600 {
         state.step::<Scalar, _>(&operator, k, [load(n - 1), load(n), load(n + 1)], step);
     }
@@ -199,7 +215,7 @@ fn the_pressure_in_fluid_1_is_real_for_a_triclinic_bone() {
 
 #[test]
 fn steps_above_the_limit_grow_without_bound_and_those_below_do_not() {
-    let operator = Operator::<1>::new(&setup(), &whole(), &mesh());
+    let operator = Operator::<1>::new(&whole(), &mesh());
     let k = Lanes::splat(4900.0);
     let mut state = WaveState::default();
     let limit = stability_limit::<Scalar, _>(&operator, 4900.0, &mut state);
