@@ -1,0 +1,118 @@
+//! The guided waves of a case's bone at several frequencies.
+
+use std::fmt::Write as _;
+
+use osteon_common::case::Case;
+use osteon_solver::{Isa, Mode, ModesError, Solver};
+use rayon::ThreadPoolBuildError;
+use rayon::prelude::*;
+use thiserror::Error;
+
+/// All guided waves of a bone in a vacuum, at each of some frequencies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BandModes {
+    /// The frequencies, Hz, with their waves by ascending phase velocity.
+    pub frequencies: Vec<(f64, Vec<Mode>)>,
+}
+
+/// A wave over the frequencies at which it propagates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WaveRange {
+    /// Its name, or family and rank.
+    pub label: String,
+    /// Lowest frequency, Hz, with its phase velocity there, m/s.
+    pub first: [f64; 2],
+    /// The same of the highest frequency.
+    pub last: [f64; 2],
+    /// Number of frequencies at which it is a backward wave.
+    pub backward: usize,
+}
+
+/// Why guided waves are not known.
+#[derive(Debug, Error)]
+pub enum BandModesError {
+    /// The bone has none that can be stated at a frequency.
+    #[error(transparent)]
+    Modes(#[from] ModesError),
+    /// No threads can be started.
+    #[error(transparent)]
+    Threads(#[from] ThreadPoolBuildError),
+}
+
+impl BandModes {
+    /// Computes the waves at these frequencies, Hz. They are the same for every number of threads.
+    ///
+    /// # Errors
+    /// If a frequency is out of scale for the bone, or if no threads can be started.
+    pub fn compute(
+        case: &Case,
+        frequencies: &[f64],
+        isa: Isa,
+        threads: usize,
+    ) -> Result<Self, BandModesError> {
+        let solver = Solver::with_isa(&case.setup, isa);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        let modes = |&frequency: &f64| Ok((frequency, solver.modes(&case.bone, frequency)?));
+        let found: Vec<Result<_, ModesError>> =
+            pool.install(|| frequencies.par_iter().map(modes).collect());
+        let frequencies = found.into_iter().collect::<Result<_, _>>()?;
+        Ok(Self { frequencies })
+    }
+
+    /// Returns one row for each wave and frequency, with a heading.
+    pub fn to_csv(&self) -> String {
+        let mut text =
+            "frequency,wave,family,rank,wavenumber,phase_velocity,group_velocity\n".to_owned();
+        for (frequency, modes) in &self.frequencies {
+            for mode in modes {
+                let Mode { family, rank, name, wavenumber, phase_velocity, group_velocity } = mode;
+                let name = name.as_deref().unwrap_or("");
+                // Writing to a string cannot fail.
+                let _ = writeln!(
+                    text,
+                    "{frequency:?},{name},{family},{rank},{wavenumber:?},{phase_velocity:?},{group_velocity:?}"
+                );
+            }
+        }
+        text
+    }
+
+    /// Returns each wave over its frequencies, by the frequency at which it begins.
+    pub fn ranges(&self) -> Vec<WaveRange> {
+        let mut ranges: Vec<WaveRange> = Vec::new();
+        for (frequency, modes) in &self.frequencies {
+            for mode in modes {
+                let (label, here) = (label(mode), [*frequency, mode.phase_velocity]);
+                let backward = usize::from(mode.group_velocity < 0.0);
+                match ranges.iter_mut().find(|range| range.label == label) {
+                    Some(range) => {
+                        range.last = here;
+                        range.backward += backward;
+                    }
+                    None => ranges.push(WaveRange { label, first: here, last: here, backward }),
+                }
+            }
+        }
+        ranges
+    }
+
+    /// Returns the points of a figure, frequency (Hz) and phase velocity (m/s), of each family.
+    pub fn points(&self) -> Vec<(&'static str, Vec<[f64; 2]>)> {
+        let mut families: Vec<(&'static str, Vec<[f64; 2]>)> = Vec::new();
+        for (frequency, modes) in &self.frequencies {
+            for mode in modes {
+                let point = [*frequency, mode.phase_velocity];
+                match families.iter_mut().find(|(family, _)| *family == mode.family) {
+                    Some((_, points)) => points.push(point),
+                    None => families.push((mode.family, vec![point])),
+                }
+            }
+        }
+        families
+    }
+}
+
+/// Returns the name of a wave, or its family and rank.
+pub fn label(mode: &Mode) -> String {
+    mode.name.clone().unwrap_or_else(|| format!("{} {}", mode.family.replace('_', " "), mode.rank))
+}
