@@ -20,6 +20,10 @@ pub(crate) struct ModesArguments {
     /// 1e4:2e6:200 [default: the probe's centre frequency]
     #[arg(long, value_name = "HZ")]
     pub(crate) frequencies: Option<FrequencyBand>,
+    /// Compute the waves between coupling and marrow as half-spaces, with the attenuation of all
+    /// layers, instead of those in a vacuum
+    #[arg(long)]
+    pub(crate) in_fluids: bool,
     /// Number of threads to compute on [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use osteon_common::warnings::case_warnings;
 use osteon_files::case_file;
-use osteon_local::modes::{BandModes, BandModesError};
+use osteon_local::modes::{BandModes, BandModesError, Surroundings};
 use osteon_solver::{Isa, ModesError};
 
 use crate::arguments::{FrequencyBand, ModesArguments};
@@ -22,7 +22,7 @@ const FIGURE: &str = "modes.svg";
 
 /// Computes the waves, writes their files if requested, and prints them.
 pub(super) async fn modes(arguments: ModesArguments, isa: Isa, cores: u32) -> Ended {
-    let ModesArguments { case, frequencies, threads, out, json } = arguments;
+    let ModesArguments { case, frequencies, in_fluids, threads, out, json } = arguments;
     let input = case.open().map_err(CommandFailure::bad_input)?;
     let case = case_file::of_input(&input).map_err(CommandFailure::bad_input)?;
     warnings::say_all(&case_warnings(&case));
@@ -34,7 +34,8 @@ pub(super) async fn modes(arguments: ModesArguments, isa: Isa, cores: u32) -> En
     let center = FrequencyBand::single(case.setup.probe.center_frequency);
     let frequencies = frequencies.unwrap_or(center).frequencies();
     let threads = threads.unwrap_or(cores) as usize;
-    let compute = move || BandModes::compute(&case, &frequencies, isa, threads);
+    let surroundings = if in_fluids { Surroundings::Fluids } else { Surroundings::Vacuum };
+    let compute = move || BandModes::compute(&case, surroundings, &frequencies, isa, threads);
     let computed = tokio::task::spawn_blocking(compute).await.map_err(CommandFailure::failed)?;
     let modes = computed.map_err(|error| match error {
         BandModesError::Modes(ModesError::TooLow { .. } | ModesError::TooMany { .. }) => {

@@ -12,7 +12,7 @@ pub fn dispersion_figure(families: &[(&'static str, Vec<[f64; 2]>)]) -> String {
         || families.iter().flat_map(|(_, points)| points).map(|[_, velocity]| *velocity);
     let lowest = velocities().fold(f64::INFINITY, f64::min);
     let y = Axis::linear("phase velocity (m/s)").with_ends(0.0, HIGHEST * lowest);
-    let title = "Guided waves of the bone in a vacuum";
+    let title = "Guided waves of the bone";
     let mut chart = Chart::new("modes", title, Axis::linear("frequency (MHz)"), y);
     let beyond = velocities().filter(|velocity| *velocity > HIGHEST * lowest).count();
     chart.description = format!(

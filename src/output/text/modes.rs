@@ -1,8 +1,8 @@
 //! The guided waves of a bone.
 
 use osteon_common::visible;
-use osteon_local::modes::{WaveRange, label};
-use osteon_solver::Mode;
+use osteon_local::modes::{BandModes, Surroundings, WaveRange, attenuation, label};
+use osteon_solver::{FluidModes, Mode};
 
 use super::layout::{aligned, wrapped};
 use super::number::{VELOCITY_DIGITS, digits};
@@ -11,24 +11,27 @@ use crate::output::ShownModes;
 /// Significant digits of a frequency.
 const FREQUENCY_DIGITS: usize = 5;
 
+/// Significant digits of an attenuation.
+const ATTENUATION_DIGITS: usize = 4;
+
 /// Returns the waves of a single frequency, or over which of several frequencies each wave propagates.
 pub(super) fn table(shown: &ShownModes<'_>) -> String {
-    let mut text = match shown.modes.frequencies.as_slice() {
-        [(frequency, modes)] => {
-            let megahertz = digits(1e-6 * frequency, FREQUENCY_DIGITS);
-            let heading = wrapped(&format!(
-                "guided waves of the bone in a vacuum at {megahertz} MHz, without attenuation"
-            ));
-            format!("{heading}\n{}", single(modes))
-        }
-        several => {
-            let heading = wrapped(&format!(
-                "guided waves of the bone in a vacuum at {} frequencies, without attenuation",
-                several.len()
-            ));
-            format!("{heading}\n{}", ranges(&shown.modes.ranges()))
-        }
+    let BandModes { surroundings, frequencies } = shown.modes;
+    let place = match surroundings {
+        Surroundings::Vacuum => "in a vacuum, without attenuation",
+        Surroundings::Fluids => "between coupling and marrow as half-spaces",
     };
+    let (at, waves) = match frequencies.as_slice() {
+        [(frequency, found)] => {
+            (format!("{} MHz", digits(1e-6 * frequency, FREQUENCY_DIGITS)), single(&found.modes))
+        }
+        several => (format!("{} frequencies", several.len()), ranges(&shown.modes.ranges())),
+    };
+    let mut text = wrapped(&format!("guided waves of the bone at {at}, {place}"));
+    text.push_str(&format!("\n{waves}"));
+    if *surroundings == Surroundings::Fluids {
+        text.push_str(&format!("\n{}", completeness(frequencies)));
+    }
     if let Some(directory) = shown.directory {
         text.push_str(&format!(
             "\n{}",
@@ -38,14 +41,46 @@ pub(super) fn table(shown: &ShownModes<'_>) -> String {
     text
 }
 
+/// Returns which waves are missing.
+fn completeness(frequencies: &[(f64, FluidModes)]) -> String {
+    let mut lost: Vec<String> = Vec::new();
+    for mode in frequencies.iter().flat_map(|(_, found)| &found.lost) {
+        if !lost.contains(&label(mode)) {
+            lost.push(label(mode));
+        }
+    }
+    let mut text = String::new();
+    if !lost.is_empty() {
+        text.push_str(&wrapped(&format!(
+            "could not be followed from the vacuum everywhere: {}",
+            lost.join(", ")
+        )));
+    }
+    let unknown = frequencies.iter().filter(|(_, found)| found.others.is_none()).count();
+    let most = frequencies.iter().filter_map(|(_, found)| found.others).max();
+    if let Some(most) = most.filter(|most| *most > 0) {
+        text.push_str(&wrapped(&format!(
+            "at most {most} other waves at a frequency have no more attenuation than these, such as slow \
+             ones of the fluids along the bone"
+        )));
+    }
+    if unknown > 0 {
+        text.push_str(&wrapped(&format!(
+            "other waves could not be counted at {unknown} frequencies"
+        )));
+    }
+    text
+}
+
 fn single(modes: &[Mode]) -> String {
-    let heading = ["wave", "wavenumber (rad/mm)", "phase velocity (m/s)", "group velocity (m/s)"];
+    let heading = ["wave", "k (rad/mm)", "phase (m/s)", "group (m/s)", "attenuation (dB/cm)"];
     let mut rows = vec![heading.map(str::to_owned)];
     for mode in modes {
         let wavenumber = digits(1e-3 * mode.wavenumber, VELOCITY_DIGITS);
         let [phase, group] =
             [mode.phase_velocity, mode.group_velocity].map(|one| digits(one, VELOCITY_DIGITS));
-        rows.push([label(mode), wavenumber, phase, group]);
+        let attenuation = digits(attenuation(mode), ATTENUATION_DIGITS);
+        rows.push([label(mode), wavenumber, phase, group, attenuation]);
     }
     aligned(&rows)
 }

@@ -76,31 +76,67 @@ impl Kernel for WaveDeterminant<'_> {
     }
 }
 
+/// The last joint is a part of the determinant and not eliminated before: where the whole bone has a wave between
+/// clamped faces, its stiffness is singular. A wave of horizontal shear with free faces has the same wavenumber as
+/// one with clamped faces.
 #[inline(always)]
 fn wave_determinant(asked: &WaveDeterminant<'_>) -> Scaled {
     let WaveDeterminant { media, components, s, k, loads } = *asked;
-    let mut whole = layer_stiffness(&media.uppermost, components, s, k);
-    for layer in &media.lower {
-        whole = whole.on(&layer_stiffness(layer, components, s, k), components);
+    let mut upper = layer_stiffness(&media.uppermost, components, s, k);
+    let Some((lowest, between)) = media.lower.split_last() else {
+        return determinant(
+            &faces(&upper, loads),
+            &rows_of::<6>(components)[..2 * components.len()],
+        )
+        .times(upper.clamped);
+    };
+    for layer in between {
+        upper = upper.on(&layer_stiffness(layer, components, s, k), components);
     }
+    let lower = layer_stiffness(lowest, components, s, k);
+    let mut all = [[Complex::default(); 9]; 9];
+    let [above, below] = [
+        faces(&upper, [loads[0], Complex::default()]),
+        faces(&lower, [Complex::default(), loads[1]]),
+    ];
+    for i in 0..6 {
+        for j in 0..6 {
+            all[i][j] = all[i][j] + above[i][j];
+            all[i + 3][j + 3] = all[i + 3][j + 3] + below[i][j];
+        }
+    }
+    determinant(&all, &rows_of::<9>(components)[..3 * components.len()])
+        .times(upper.clamped)
+        .times(lower.clamped)
+}
+
+/// Returns the stiffness of both faces with these loads.
+#[inline(always)]
+fn faces(layer: &LayerStiffness, loads: [Complex; 2]) -> [[Complex; 6]; 6] {
     let mut all = [[Complex::default(); 6]; 6];
     for i in 0..3 {
         for j in 0..3 {
-            all[i][j] = whole.top[i][j];
-            all[i][j + 3] = whole.down[i][j];
-            all[i + 3][j] = whole.up[i][j];
-            all[i + 3][j + 3] = whole.bottom[i][j];
+            all[i][j] = layer.top[i][j];
+            all[i][j + 3] = layer.down[i][j];
+            all[i + 3][j] = layer.up[i][j];
+            all[i + 3][j + 3] = layer.bottom[i][j];
         }
     }
     all[2][2] = all[2][2] + loads[0];
     all[5][5] = all[5][5] + loads[1];
-    let mut rows = [0; 6];
-    let count = components.len();
-    for (place, &component) in components.iter().enumerate() {
-        rows[place] = component;
-        rows[place + count] = component + 3;
+    all
+}
+
+/// Returns the rows of these components in one place after the other, at the start.
+#[inline(always)]
+fn rows_of<const N: usize>(components: &[usize]) -> [usize; N] {
+    let mut rows = [0; N];
+    for place in 0..N / 3 {
+        for (index, &component) in components.iter().enumerate() {
+            rows[place * components.len() + index] = 3 * place + component;
+        }
     }
-    determinant(&all, &rows[..2 * count]).times(whole.clamped)
+    rows
 }
 
 #[inline(always)]

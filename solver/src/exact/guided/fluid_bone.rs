@@ -113,10 +113,10 @@ impl FluidBone<'_> {
     /// Returns F/F' of the determinant.
     fn newton_step(&self, k: Complex) -> Complex {
         let step = k.scale(STEP);
-        let (here, after) = (self.determinant(k), self.determinant(k + step));
-        let before = self.determinant(k - step);
-        let slope = after.over(here) - before.over(here);
-        step.scale(2.0) / slope
+        // In units of a value beside the root, where it is not zero.
+        let unit = self.determinant(k + step);
+        let slope = Complex::new(1.0, 0.0) - self.determinant(k - step).over(unit);
+        step.scale(2.0) * self.determinant(k).over(unit) / slope
     }
 
     /// Returns the group velocity dω/dk along x1 of the wave with this wavenumber (rad/m), m/s: 1/Re(dk/dω).

@@ -11,7 +11,7 @@ use super::crossings::crossings;
 use super::family::{FLEXURAL, Family, Symmetry};
 use super::free_bone::{FreeBone, bisect};
 use crate::isa::Isa;
-use crate::media::Media;
+use crate::media::{Media, MediumLayer};
 use crate::solver::Solver;
 
 /// Maximum number of waves of one family at one frequency.
@@ -21,6 +21,8 @@ const MODES_MAX: u64 = 1000;
 const THINNEST: f64 = 1e-4;
 /// The search begins at this part of the least wavenumber of a wave without cut-off frequency.
 const FIRST: f64 = 1e-9;
+/// The smaller part of a golden section.
+const DIVISION: f64 = 0.381_966_011_250_105_15;
 /// Part by which bounds are moved outwards, for rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -115,8 +117,9 @@ impl FreeModes {
         frequency: f64,
     ) -> Result<Self, ModesError> {
         let (isa, thickness) = (solver.isa(), solver.setup().layers.bone_thickness);
-        let (media, sublayers) = (Media::new(isa, bone, thickness), bone.sublayers(thickness));
+        let sublayers = bone.sublayers(thickness);
         let symmetry = Symmetry::new(&sublayers);
+        let media = divided(&Media::new(isa, bone, thickness), symmetry.halves());
         let mut free_bone = FreeBone::new(isa, &media, symmetry);
         let (omega, undecided) = (TAU * frequency, ModesError::Undecided { frequency });
         let lowest = THINNEST * free_bone.fastest / (TAU * free_bone.thickness);
@@ -159,6 +162,34 @@ impl FreeModes {
         let family = self.families.iter().find(|(name, _)| *name == mode.family);
         family.map_or(&[], |(_, place)| &self.components[*place])
     }
+}
+
+/// Returns the same bone with each solid in two parts of irrational ratio, or the one in its middle in three, so
+/// that it remains the same from both faces.
+///
+/// A wave of horizontal shear with n nodes has a joint of equal halves, quarters, … of a solid where its traction
+/// is zero. There the joint's stiffness is zero, and what is added to the faces' stiffness infinite. So are those
+/// of all waves at their cut-off frequencies.
+fn divided(media: &Media, is_half: bool) -> Media {
+    let count = media.iter().count();
+    let middle = is_half.then_some(count / 2);
+    let mut parts = Vec::new();
+    for (place, MediumLayer { medium, thickness }) in media.iter().enumerate() {
+        let shares: &[f64] = if middle == Some(place) {
+            &[0.5 * DIVISION, 1.0 - DIVISION, 0.5 * DIVISION]
+        } else if middle.is_some_and(|middle| middle < place) {
+            &[1.0 - DIVISION, DIVISION]
+        } else {
+            &[DIVISION, 1.0 - DIVISION]
+        };
+        parts.extend(
+            shares
+                .iter()
+                .map(|share| MediumLayer { medium: medium.clone(), thickness: share * thickness }),
+        );
+    }
+    let lower = parts.split_off(1);
+    Media { uppermost: parts.swap_remove(0), lower }
 }
 
 /// Returns a wavenumber (rad/m) beyond which every wave of the bone has a higher frequency than `omega`
