@@ -71,6 +71,23 @@ fn a_band_is_written_as_a_table_and_a_figure() {
     assert!(refused.stderr.contains("already exists and is not overwritten"), "{refused:?}");
 }
 
+/// In fluids A0 and S0 lose energy, and horizontally sheared waves, which do not move the faces across, none.
+#[test]
+fn waves_in_fluids_are_attenuated() {
+    let scratch = Scratch::new();
+    let out = scratch.path("modes");
+    let arguments = ["modes", &example("A.toml"), "--in-fluids", "--out", text(&out)];
+    let printed = run(&arguments).succeeded().to_owned();
+    assert!(printed.contains("between coupling and marrow as half-spaces"), "{printed}");
+    let rows = rows(&out.join("modes.csv"));
+    let attenuation = |wave: &str| -> f64 {
+        let row = rows.iter().find(|row| row[1] == wave).unwrap();
+        row[7].parse().unwrap()
+    };
+    assert!(attenuation("A0") > 1.0 && attenuation("S0") > 1.0, "{printed}");
+    assert!(attenuation("SH0").abs() < 1e-6, "{printed}");
+}
+
 #[test]
 fn threads_change_nothing() {
     let case = example("D.toml");

@@ -100,6 +100,26 @@ fn an_isotropic_plate_has_the_waves_of_rayleigh_and_lamb() {
     assert!(backward >= 1, "{backward} backward waves");
 }
 
+/// With Poisson's ratio ¼, waves of a single face have the velocity √(2 - 2/√3) of shear waves (Rayleigh). In a thin
+/// plate S0 has the velocity √(E/(ρ (1 - ν²))).
+#[test]
+fn thick_and_thin_plates_have_the_velocities_of_a_face_and_of_a_membrane() {
+    let (young, poisson, thickness) = (16e9, 0.25, 3e-3);
+    let bone = isotropic(young, poisson);
+    let shear = across(&bone)[0];
+    let face = shear * (2.0 - 2.0 / 3.0f64.sqrt()).sqrt();
+    let membrane = (young / (1.0 - poisson * poisson) / bone.density).sqrt();
+    // Both faces know of each other by exp(-32); the square of kh is 1e-6.
+    for (name, scaled, expected, limit) in
+        [("A0", 12.0, face, 1e-11), ("S0", 12.0, face, 1e-11), ("S0", 2e-4, membrane, 1e-6)]
+    {
+        let found = modes(&bone, thickness, scaled * shear / thickness);
+        let mode = found.iter().find(|mode| mode.name.as_deref() == Some(name)).unwrap();
+        let error = mode.phase_velocity / expected - 1.0;
+        assert!(error.abs() < limit, "{scaled}, {mode:?}: {error:e}");
+    }
+}
+
 /// A wave begins at its cut-off frequency, at which its wavelength is infinite.
 #[test]
 fn waves_begin_at_the_resonances_of_the_thickness() {
