@@ -29,7 +29,7 @@ pub(super) struct Crossing {
 
 /// Wavenumbers with the number of waves below the frequency at both.
 #[derive(Debug, Clone, Copy)]
-struct Interval {
+struct WavenumberInterval {
     /// Lower and upper wavenumber, rad/m.
     ends: [f64; 2],
     counts: [u64; 2],
@@ -45,9 +45,11 @@ pub(super) fn crossings(
 ) -> Option<Vec<Crossing>> {
     let resolution = RESOLUTION * omega / bone.fastest;
     let counts = [bone.count(family, ends[0], omega)?, bone.count(family, ends[1], omega)?];
-    let (mut found, mut left) = (Vec::new(), vec![Interval { ends, counts }]);
+    let (mut found, mut left) = (Vec::new(), vec![WavenumberInterval { ends, counts }]);
     for _ in 0..INTERVALS_MAX {
-        let Some(Interval { ends: [low, high], counts }) = left.pop() else { return Some(found) };
+        let Some(WavenumberInterval { ends: [low, high], counts }) = left.pop() else {
+            return Some(found);
+        };
         if high - low <= resolution {
             let (least, most) = (counts[0].min(counts[1]), counts[0].max(counts[1]));
             let rises = counts[0] > counts[1];
@@ -65,8 +67,8 @@ pub(super) fn crossings(
             continue;
         }
         let count = bone.count(family, middle, omega)?;
-        left.push(Interval { ends: [middle, high], counts: [count, counts[1]] });
-        left.push(Interval { ends: [low, middle], counts: [counts[0], count] });
+        left.push(WavenumberInterval { ends: [middle, high], counts: [count, counts[1]] });
+        left.push(WavenumberInterval { ends: [low, middle], counts: [counts[0], count] });
     }
     None
 }
