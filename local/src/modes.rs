@@ -10,7 +10,7 @@ use thiserror::Error;
 
 /// What is on both sides of a bone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Surroundings {
+pub enum BoneSurroundings {
     /// Nothing; the bone has no attenuation, either.
     Vacuum,
     /// Coupling and marrow as half-spaces; all layers have the attenuation of their case.
@@ -24,7 +24,7 @@ const DB_PER_CM: f64 = 0.086_858_896_380_650_36;
 #[derive(Debug, Clone, PartialEq)]
 pub struct BandModes {
     /// What is on both sides of the bone.
-    pub surroundings: Surroundings,
+    pub surroundings: BoneSurroundings,
     /// The frequencies, Hz, with their waves by ascending phase velocity.
     pub frequencies: Vec<(f64, FluidModes)>,
 }
@@ -60,7 +60,7 @@ impl BandModes {
     /// If a frequency is out of scale for the bone, or if no threads can be started.
     pub fn compute(
         case: &Case,
-        surroundings: Surroundings,
+        surroundings: BoneSurroundings,
         frequencies: &[f64],
         isa: Isa,
         threads: usize,
@@ -69,11 +69,11 @@ impl BandModes {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         let modes = |&frequency: &f64| {
             let found = match surroundings {
-                Surroundings::Vacuum => {
+                BoneSurroundings::Vacuum => {
                     let modes = solver.modes(&case.bone, frequency)?;
                     FluidModes { modes, lost: Vec::new(), others: Some(0) }
                 }
-                Surroundings::Fluids => solver.modes_in_fluids(&case.bone, frequency)?,
+                BoneSurroundings::Fluids => solver.modes_in_fluids(&case.bone, frequency)?,
             };
             Ok((frequency, found))
         };

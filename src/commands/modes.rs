@@ -4,7 +4,7 @@ use std::path::Path;
 
 use osteon_common::warnings::case_warnings;
 use osteon_files::case_file;
-use osteon_local::modes::{BandModes, BandModesError, Surroundings};
+use osteon_local::modes::{BandModes, BandModesError, BoneSurroundings};
 use osteon_solver::{Isa, ModesError};
 
 use crate::arguments::{FrequencyBand, ModesArguments};
@@ -34,7 +34,7 @@ pub(super) async fn modes(arguments: ModesArguments, isa: Isa, cores: u32) -> En
     let center = FrequencyBand::single(case.setup.probe.center_frequency);
     let frequencies = frequencies.unwrap_or(center).frequencies();
     let threads = threads.unwrap_or(cores) as usize;
-    let surroundings = if in_fluids { Surroundings::Fluids } else { Surroundings::Vacuum };
+    let surroundings = if in_fluids { BoneSurroundings::Fluids } else { BoneSurroundings::Vacuum };
     let compute = move || BandModes::compute(&case, surroundings, &frequencies, isa, threads);
     let computed = tokio::task::spawn_blocking(compute).await.map_err(CommandFailure::failed)?;
     let modes = computed.map_err(|error| match error {

@@ -1,7 +1,7 @@
 //! The guided waves of a bone.
 
 use osteon_common::visible;
-use osteon_local::modes::{BandModes, Surroundings, WaveRange, attenuation, label};
+use osteon_local::modes::{BandModes, BoneSurroundings, WaveRange, attenuation, label};
 use osteon_solver::{FluidModes, Mode};
 
 use super::layout::{aligned, wrapped};
@@ -18,8 +18,8 @@ const ATTENUATION_DIGITS: usize = 4;
 pub(super) fn table(shown: &ShownModes<'_>) -> String {
     let BandModes { surroundings, frequencies } = shown.modes;
     let place = match surroundings {
-        Surroundings::Vacuum => "in a vacuum, without attenuation",
-        Surroundings::Fluids => "between coupling and marrow as half-spaces",
+        BoneSurroundings::Vacuum => "in a vacuum, without attenuation",
+        BoneSurroundings::Fluids => "between coupling and marrow as half-spaces",
     };
     let (at, waves) = match frequencies.as_slice() {
         [(frequency, found)] => {
@@ -29,7 +29,7 @@ pub(super) fn table(shown: &ShownModes<'_>) -> String {
     };
     let mut text = wrapped(&format!("guided waves of the bone at {at}, {place}"));
     text.push_str(&format!("\n{waves}"));
-    if *surroundings == Surroundings::Fluids {
+    if *surroundings == BoneSurroundings::Fluids {
         text.push_str(&format!("\n{}", completeness(frequencies)));
     }
     if let Some(directory) = shown.directory {

@@ -5,7 +5,9 @@
 //! det(K) det(Y) is an analytic function of k without poles: det(Y) is zero where a wave fits between clamped
 //! faces, where K is infinite. It is multiplied up while layers are put together.
 
-use super::dense::{Matrix3, Scaled, UNIT, ZERO, determinant, inverse, minus_product, product};
+use super::dense::{
+    ComplexMatrix3, Scaled, UNIT, ZERO, determinant, inverse, minus_product, product,
+};
 use crate::complex::Complex;
 use crate::isa::Kernel;
 use crate::media::{Media, MediumLayer};
@@ -21,11 +23,11 @@ const DOUBLINGS_MAX: u32 = 40;
 
 /// Stiffness of a layer between its faces, Pa/m.
 struct LayerStiffness {
-    top: Matrix3,
+    top: ComplexMatrix3,
     /// Tractions on top by displacements of the bottom, and the opposite.
-    down: Matrix3,
-    up: Matrix3,
-    bottom: Matrix3,
+    down: ComplexMatrix3,
+    up: ComplexMatrix3,
+    bottom: ComplexMatrix3,
     /// det(Y).
     clamped: Scaled,
 }
@@ -195,7 +197,7 @@ fn slice_stiffness(
 
 /// Returns the blocks X, Y, W and V of exp(M d) by its series; tractions are in units of stiffness / d.
 #[inline(always)]
-fn transfer(medium: &Medium, s: Complex, k: Complex, slice: f64) -> [Matrix3; 4] {
+fn transfer(medium: &Medium, s: Complex, k: Complex, slice: f64) -> [ComplexMatrix3; 4] {
     let kappa = Complex::new(k.im, -k.re).scale(slice);
     let sigma = (s * s).scale(medium.density * slice * slice / medium.stiffness);
     let square = kappa * kappa;

@@ -3,12 +3,12 @@
 use crate::complex::Complex;
 
 /// A 3×3 matrix, by rows.
-pub(super) type Matrix3 = [[Complex; 3]; 3];
+pub(super) type ComplexMatrix3 = [[Complex; 3]; 3];
 
 /// The matrix of zeros.
-pub(super) const ZERO: Matrix3 = [[Complex::new(0.0, 0.0); 3]; 3];
+pub(super) const ZERO: ComplexMatrix3 = [[Complex::new(0.0, 0.0); 3]; 3];
 /// The unit matrix.
-pub(super) const UNIT: Matrix3 = {
+pub(super) const UNIT: ComplexMatrix3 = {
     let mut unit = ZERO;
     unit[0][0] = Complex::new(1.0, 0.0);
     unit[1][1] = unit[0][0];
@@ -51,7 +51,11 @@ impl Scaled {
 
 /// Returns a - b c.
 #[inline(always)]
-pub(super) fn minus_product(a: &Matrix3, b: &Matrix3, c: &Matrix3) -> Matrix3 {
+pub(super) fn minus_product(
+    a: &ComplexMatrix3,
+    b: &ComplexMatrix3,
+    c: &ComplexMatrix3,
+) -> ComplexMatrix3 {
     let mut result = *a;
     for i in 0..3 {
         for j in 0..3 {
@@ -65,7 +69,7 @@ pub(super) fn minus_product(a: &Matrix3, b: &Matrix3, c: &Matrix3) -> Matrix3 {
 
 /// Returns b c.
 #[inline(always)]
-pub(super) fn product(b: &Matrix3, c: &Matrix3) -> Matrix3 {
+pub(super) fn product(b: &ComplexMatrix3, c: &ComplexMatrix3) -> ComplexMatrix3 {
     let mut result = ZERO;
     for i in 0..3 {
         for j in 0..3 {
@@ -79,7 +83,7 @@ pub(super) fn product(b: &Matrix3, c: &Matrix3) -> Matrix3 {
 
 /// Returns the inverse by cofactors.
 #[inline(always)]
-pub(super) fn inverse(a: &Matrix3) -> Matrix3 {
+pub(super) fn inverse(a: &ComplexMatrix3) -> ComplexMatrix3 {
     let mut cofactors = ZERO;
     for i in 0..3 {
         for j in 0..3 {
@@ -144,7 +148,7 @@ mod tests {
     use super::*;
 
     /// A matrix without symmetry.
-    fn matrix() -> Matrix3 {
+    fn matrix() -> ComplexMatrix3 {
         std::array::from_fn(|i| {
             std::array::from_fn(|j| {
                 let (x, y) = (i as f64, j as f64);
