@@ -121,7 +121,8 @@ fn add_followed(bone: &FluidBone<'_>, waves: &[&Mode], range: [f64; 2], found: &
             wavenumber: k.re,
             phase_velocity: bone.omega / k.re,
             group_velocity: bone.group_velocity(k),
-            attenuation: -k.im,
+            // Not -k.im, which is -0 where nothing is lost.
+            attenuation: 0.0 - k.im,
             ..(*wave).clone()
         });
     }
