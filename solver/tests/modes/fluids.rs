@@ -111,7 +111,7 @@ fn singular(elements: &FiniteElements, setup: &Setup, k: c64, omega: f64) -> f64
         let radiates = k.re < omega / fluid.sound_speed;
         let q = if (radiates && q.re < 0.0) || (!radiates && q.im > 0.0) { -q } else { q };
         let load = c64::new(0.0, fluid.density * omega * omega) / q;
-        matrix[(place, place)] = matrix[(place, place)] + load;
+        matrix[(place, place)] += load;
     }
     let values = matrix.singular_values().unwrap();
     values[size - 1] / values[0]
