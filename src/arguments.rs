@@ -4,6 +4,7 @@ mod check;
 mod earlier;
 mod inputs;
 mod jobs;
+mod modes;
 mod noun;
 mod operators;
 mod realizations;
@@ -26,6 +27,7 @@ pub(crate) use jobs::{
     ExplainArguments, FetchArguments, JobArguments, JobCommand, JobListArguments, PruneArguments,
     SubmitArguments, WatchArguments,
 };
+pub(crate) use modes::{FrequencyBand, ModesArguments};
 pub(crate) use noun::Noun;
 pub(crate) use operators::{
     BackupArguments, CoordinatorCommand, DrainArguments, HealthArguments, UnbanArguments,
@@ -58,6 +60,8 @@ pub(crate) enum Command {
     Propagate(RunArguments),
     /// Solve one case: picked times, velocity, and with --out the pressure traces
     Simulate(SimulateArguments),
+    /// Compute all guided waves of a case's bone at one or several frequencies
+    Modes(ModesArguments),
     /// Check a job file, and estimate what the job costs on this machine
     Check(CheckArguments),
     /// Draw one random realization of a job and print it as a case file

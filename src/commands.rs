@@ -9,6 +9,7 @@ mod init;
 mod jobs;
 mod man;
 mod materials;
+mod modes;
 mod observe;
 mod operators;
 mod run;
@@ -42,6 +43,10 @@ fn prepare_command(
         Command::Simulate(arguments) => PreparedCommand::interruptible(
             "no results were saved",
             simulate::simulate(arguments, isa()?),
+        ),
+        Command::Modes(arguments) => PreparedCommand::interruptible(
+            "no files were written",
+            modes::modes(arguments, isa()?, context.cores),
         ),
         Command::Check(arguments) => {
             PreparedCommand::harmless(check::check(arguments, isa()?, context.cores))

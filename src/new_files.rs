@@ -62,7 +62,19 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), CommandFailure> {
 /// # Errors
 /// If it cannot be created.
 pub(crate) fn private_directory(path: &Path) -> Result<(), CommandFailure> {
-    let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(path);
+    directory_with(0o700, path)
+}
+
+/// Creates a directory; an existing one is left as it is.
+///
+/// # Errors
+/// If it cannot be created.
+pub(crate) fn directory(path: &Path) -> Result<(), CommandFailure> {
+    directory_with(0o777, path)
+}
+
+fn directory_with(mode: u32, path: &Path) -> Result<(), CommandFailure> {
+    let made = fs::DirBuilder::new().recursive(true).mode(mode).create(path);
     made.map_err(|error| {
         CommandFailure::unusable_path(
             error,

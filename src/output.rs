@@ -11,6 +11,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
 use osteon_files::report::ResultFile;
 use osteon_local::cost::JobCost;
+use osteon_local::modes::BandModes;
 use osteon_local::observations::ObservationSummary;
 use osteon_local::simulation::SolvedCase;
 use osteon_proto::v1::{
@@ -80,12 +81,23 @@ pub(crate) struct ShownObservations<'a> {
     pub(crate) file: Option<&'a Path>,
 }
 
+/// The guided waves of a bone to show.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShownModes<'a> {
+    /// The waves at each frequency.
+    pub(crate) modes: &'a BandModes,
+    /// The directory with a row for each, if it was written.
+    pub(crate) directory: Option<&'a Path>,
+}
+
 /// An output format. Every method writes whole lines.
 pub(crate) trait Output {
     /// Prints the result of a job.
     fn result(&mut self, result: &ShownResult<'_>) -> io::Result<()>;
     /// Prints the outcome of one case.
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()>;
+    /// Prints the guided waves of a bone.
+    fn modes(&mut self, modes: &ShownModes<'_>) -> io::Result<()>;
     /// Prints what a job will do and cost.
     fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()>;
     /// Prints the observables of a job's realizations.

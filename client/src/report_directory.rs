@@ -18,6 +18,8 @@ use crate::results_directory::{
 use crate::run_error::RunError;
 use crate::simulation_directory::TRACES;
 
+pub use osteon_report::dispersion_figure;
+
 /// Folder of a report within a directory of results.
 pub const REPORT: &str = "report";
 /// The page.

@@ -2,6 +2,7 @@
 
 mod comparison;
 pub(crate) mod convergence;
+mod dispersion;
 pub(crate) mod failures;
 mod figure;
 mod groups;
@@ -17,6 +18,7 @@ mod velocities;
 use crate::finding::Finding;
 
 pub(crate) use comparison::overlay;
+pub use dispersion::dispersion_figure;
 pub(crate) use figure::Figure;
 pub(crate) use groups::forest;
 pub(crate) use setup::setup_figure;

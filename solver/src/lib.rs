@@ -34,7 +34,7 @@ mod vector;
 
 pub use arrival::{Arrival, PassSummary, Sampled};
 pub use complex::Complex;
-pub use exact::guided::{GuidedWave, GuidedWaves};
+pub use exact::guided::{FluidModes, GuidedWave, GuidedWaves, Mode, ModesError};
 #[cfg(feature = "measure")]
 pub use exact::quantities::{admittance, fastest_wave, pressure};
 #[cfg(feature = "measure")]

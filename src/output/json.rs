@@ -1,6 +1,7 @@
 //! Output for programs: one JSON value per command, without inf or NaN.
 
 mod cost;
+mod modes;
 mod observations;
 
 use std::io::{self, Write};
@@ -13,7 +14,7 @@ use osteon_proto::v1::{
 };
 use serde_json::{Value, json};
 
-use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation};
+use super::{Output, ShownCost, ShownModes, ShownObservations, ShownResult, ShownSimulation};
 use crate::doctor::{self, Diagnosis};
 use crate::output::text::operators::worker_state_name;
 use crate::output::text::{kind_name, state_name, status_name};
@@ -43,6 +44,10 @@ impl Output for JsonOutput<'_> {
 
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
         self.verbatim(&simulation.solved.report(program::current()).to_json())
+    }
+
+    fn modes(&mut self, modes: &ShownModes<'_>) -> io::Result<()> {
+        self.value(&modes::value(modes))
     }
 
     fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()> {

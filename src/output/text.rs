@@ -8,6 +8,7 @@ mod fit;
 mod groups;
 mod identified;
 mod layout;
+mod modes;
 mod number;
 mod observations;
 pub(super) mod operators;
@@ -28,7 +29,7 @@ use osteon_proto::v1::{
 
 use self::layout::{WIDTH, aligned, glued};
 use self::number::significant;
-use super::{Output, ShownCost, ShownObservations, ShownResult, ShownSimulation};
+use super::{Output, ShownCost, ShownModes, ShownObservations, ShownResult, ShownSimulation};
 use crate::doctor::Diagnosis;
 use crate::progress::{JobProgress, line, span};
 
@@ -55,6 +56,10 @@ impl Output for TextOutput<'_> {
 
     fn simulation(&mut self, simulation: &ShownSimulation<'_>) -> io::Result<()> {
         self.verbatim(&simulation::table(simulation))
+    }
+
+    fn modes(&mut self, modes: &ShownModes<'_>) -> io::Result<()> {
+        self.verbatim(&modes::table(modes))
     }
 
     fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()> {

@@ -45,6 +45,11 @@ impl ReportOption {
     }
 }
 
+/// Returns a figure of phase velocities (m/s) over frequencies (Hz) as SVG, with a series for each name.
+pub(crate) fn dispersion_figure(series: &[(&'static str, Vec<[f64; 2]>)]) -> Option<String> {
+    Some(report_directory::dispersion_figure(series))
+}
+
 /// Reads the results, and writes their report.
 pub(super) fn report(arguments: &ReportArguments) -> Ended {
     let directories = &arguments.directories;

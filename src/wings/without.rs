@@ -53,6 +53,12 @@ mod report {
     }
 }
 
+/// No figure.
+#[cfg(not(feature = "report"))]
+pub(crate) fn dispersion_figure(_: &[(&'static str, Vec<[f64; 2]>)]) -> Option<String> {
+    None
+}
+
 #[cfg(not(feature = "live"))]
 pub(crate) use self::live::{PageOptions, RunPageOption};
 #[cfg(not(feature = "report"))]

@@ -66,6 +66,17 @@ impl Symmetry {
     pub(super) fn halves(self) -> bool {
         self.plate || self.cross
     }
+
+    /// Returns all families of waves.
+    pub(super) fn families(self) -> Vec<Family> {
+        let mut families: Vec<Family> = Vec::new();
+        for of in 0..FACES {
+            if !families.iter().any(|family| family.faces.contains(&of)) {
+                families.push(Family::new(self, of));
+            }
+        }
+        families
+    }
 }
 
 /// Waves that do not cross each other: those of one behaviour under every symmetry of the solid.
@@ -100,6 +111,39 @@ impl Family {
             middle: faces.iter().copied().filter(|face| *face < 3).collect(),
             copies: if symmetry.halves() { 1 } else { 2 },
             faces,
+        }
+    }
+
+    /// Returns what its waves have in common: what is the same or the opposite on both sides of the middle
+    /// plane, or the direction of the displacement.
+    pub(super) fn name(&self) -> &'static str {
+        match *self.faces.as_slice() {
+            [0, 5] | [0, 1, 5] => "symmetric",
+            [2, 3] | [2, 3, 4] => "antisymmetric",
+            [1] => "shear_symmetric",
+            [4] => "shear_antisymmetric",
+            [1, 4] => "shear",
+            [0, 2, 3, 5] => "sagittal",
+            // After half a turn about x1.
+            [0, 4, 5] => "turned_same",
+            [1, 2, 3] => "turned_opposite",
+            _ => "all",
+        }
+    }
+
+    /// Returns the usual name of the wave of this rank, given that of S0. Waves that are numbered by symmetry
+    /// have one, and A0 and S0 of every bone.
+    pub(super) fn name_of(&self, rank: u64, extensional: u64) -> Option<String> {
+        let numbered = |letters, number: u64| Some(format!("{letters}{number}"));
+        match *self.faces.as_slice() {
+            [0, 5] => numbered("S", rank - 1),
+            [2, 3] => numbered("A", rank - 1),
+            [1] => numbered("SH", 2 * rank - 2),
+            [4] => numbered("SH", 2 * rank - 1),
+            [1, 4] => numbered("SH", rank - 1),
+            _ if rank == 1 && self.faces.contains(&FLEXURAL) => numbered("A", 0),
+            _ if rank == extensional && self.faces.contains(&EXTENSIONAL) => numbered("S", 0),
+            _ => None,
         }
     }
 

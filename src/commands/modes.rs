@@ -1,0 +1,64 @@
+//! `modes`: all guided waves of a case's bone.
+
+use std::path::Path;
+
+use osteon_common::warnings::case_warnings;
+use osteon_files::case_file;
+use osteon_local::modes::{BandModes, BandModesError, BoneSurroundings};
+use osteon_solver::{Isa, ModesError};
+
+use crate::arguments::{FrequencyBand, ModesArguments};
+use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
+use crate::new_files::{self, NewFile};
+use crate::output::{self, ShownModes};
+use crate::prepared_command::Ended;
+use crate::resolved;
+use crate::warnings;
+use crate::wings::dispersion_figure;
+
+/// The file of the waves, and of their figure.
+const TABLE: &str = "modes.csv";
+const FIGURE: &str = "modes.svg";
+
+/// Computes the waves, writes their files if requested, and prints them.
+pub(super) async fn modes(arguments: ModesArguments, isa: Isa, cores: u32) -> Ended {
+    let ModesArguments { case, frequencies, in_fluids, threads, out, json } = arguments;
+    let input = case.open().map_err(CommandFailure::bad_input)?;
+    let case = case_file::of_input(&input).map_err(CommandFailure::bad_input)?;
+    warnings::say_all(&case_warnings(&case));
+    if let Some(directory) = &out {
+        for name in [TABLE, FIGURE] {
+            new_files::refuse_existing(&directory.join(name))?;
+        }
+    }
+    let center = FrequencyBand::single(case.setup.probe.center_frequency);
+    let frequencies = frequencies.unwrap_or(center).frequencies();
+    let threads = threads.unwrap_or(cores) as usize;
+    let surroundings = if in_fluids { BoneSurroundings::Fluids } else { BoneSurroundings::Vacuum };
+    let compute = move || BandModes::compute(&case, surroundings, &frequencies, isa, threads);
+    let computed = tokio::task::spawn_blocking(compute).await.map_err(CommandFailure::failed)?;
+    let modes = computed.map_err(|error| match error {
+        BandModesError::Modes(ModesError::TooLow { .. } | ModesError::TooMany { .. }) => {
+            CommandFailure::bad_input(error)
+        }
+        _ => CommandFailure::failed(error),
+    })?;
+    if let Some(directory) = &out {
+        write(directory, &modes)?;
+    }
+    let shown = ShownModes { modes: &modes, directory: out.as_deref() };
+    output::stdout(resolved::format(json)).modes(&shown).map_err(stdout_failure)?;
+    Ok(ExitStatus::Done)
+}
+
+fn write(directory: &Path, modes: &BandModes) -> Result<(), CommandFailure> {
+    new_files::directory(directory)?;
+    let file = |name: &str, text: String| NewFile {
+        path: directory.join(name),
+        text: text.into(),
+        secret: false,
+    };
+    let figure = dispersion_figure(&modes.points()).map(|svg| file(FIGURE, svg));
+    let files: Vec<NewFile> = [file(TABLE, modes.to_csv())].into_iter().chain(figure).collect();
+    new_files::create(&files)
+}

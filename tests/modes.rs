@@ -1,0 +1,116 @@
+//! `osteon modes`: the guided waves of a case's bone over a band of frequencies.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
+#[cfg(test)]
+#[expect(dead_code, reason = "each test file uses a part of it")]
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use support::{Scratch, run, text};
+
+/// The file of a case among the examples.
+fn example(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cases").join(name);
+    text(&path).to_owned()
+}
+
+/// Returns the fields of the rows of a file, without its heading.
+fn rows(file: &Path) -> Vec<Vec<String>> {
+    let fields = |line: &str| line.split(',').map(str::to_owned).collect();
+    fs::read_to_string(file).unwrap().lines().skip(1).map(fields).collect()
+}
+
+/// At the centre frequency A0 and S0 are those of `simulate`.
+#[test]
+fn fundamental_waves_are_those_of_a_simulation() {
+    for name in ["A.toml", "D.toml", "G.toml"] {
+        let case = example(name);
+        let simulated = run(&["simulate", &case, "--json"]).json();
+        let found = run(&["modes", &case, "--json"]).json();
+        let one = &found["modes"][0];
+        assert_eq!(one["frequency"], simulated["guided_waves"]["frequency"]);
+        for (wave, key) in [("A0", "a0"), ("S0", "s0")] {
+            let waves = one["waves"].as_array().unwrap();
+            let named: Vec<_> = waves.iter().filter(|one| one["wave"] == wave).collect();
+            assert_eq!(named.len(), 1, "{name}: {found}");
+            let [phase, expected] =
+                [&named[0]["phase_velocity"], &simulated["guided_waves"][key]["phase_velocity"]]
+                    .map(|value| value.as_f64().unwrap());
+            assert!((phase / expected - 1.0).abs() < 1e-12, "{name}, {wave}: {phase}, {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_band_is_written_as_a_table_and_a_figure() {
+    let scratch = Scratch::new();
+    let out = scratch.path("modes");
+    let arguments =
+        ["modes", &example("A.toml"), "--frequencies", "1e5:9e5:5", "--out", text(&out)];
+    let printed = run(&arguments).succeeded().to_owned();
+    assert!(printed.contains("at 5 frequencies") && printed.contains("\nA0 "), "{printed}");
+    let rows = rows(&out.join("modes.csv"));
+    for frequency in ["100000.0", "300000.0", "500000.0", "700000.0", "900000.0"] {
+        for wave in ["A0", "S0", "SH0"] {
+            let there = |row: &&Vec<String>| row[0] == frequency && row[1] == wave;
+            assert_eq!(rows.iter().filter(there).count(), 1, "{frequency} Hz, {wave}");
+        }
+    }
+    for row in &rows {
+        let [frequency, wavenumber, velocity] =
+            [0, 4, 5].map(|place| row[place].parse::<f64>().unwrap());
+        assert!((std::f64::consts::TAU * frequency / wavenumber / velocity - 1.0).abs() < 1e-15);
+    }
+    assert!(fs::read_to_string(out.join("modes.svg")).unwrap().contains(">antisymmetric<"));
+    // Nothing is overwritten.
+    let refused = run(&arguments);
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.stderr.contains("already exists and is not overwritten"), "{refused:?}");
+}
+
+/// In fluids A0 and S0 lose energy, and horizontally sheared waves, which do not move the faces across, none.
+#[test]
+fn waves_in_fluids_are_attenuated() {
+    let scratch = Scratch::new();
+    let out = scratch.path("modes");
+    let arguments = ["modes", &example("A.toml"), "--in-fluids", "--out", text(&out)];
+    let printed = run(&arguments).succeeded().to_owned();
+    assert!(printed.contains("between coupling and marrow as"), "{printed}");
+    let rows = rows(&out.join("modes.csv"));
+    let attenuation = |wave: &str| -> f64 {
+        let row = rows.iter().find(|row| row[1] == wave).unwrap();
+        row[7].parse().unwrap()
+    };
+    assert!(attenuation("A0") > 1.0 && attenuation("S0") > 1.0, "{printed}");
+    assert!(attenuation("SH0").abs() < 1e-6, "{printed}");
+}
+
+#[test]
+fn threads_change_nothing() {
+    let case = example("D.toml");
+    let [one, three] = ["1", "3"].map(|threads| {
+        let found =
+            run(&["modes", &case, "--frequencies", "2e5:1e6:7", "--threads", threads, "--json"]);
+        found.succeeded().to_owned()
+    });
+    assert_eq!(one, three);
+}
+
+#[test]
+fn frequencies_that_cannot_be_meant_are_refused() {
+    let case = example("A.toml");
+    for (frequencies, reason) in [
+        ("0", "it must be a frequency above 0 (Hz), or START:STOP:COUNT"),
+        ("2e6:1e6:10", "with 0 < START < STOP"),
+        ("1.5", "frequency: 1.5 Hz is too low for a bone that is so thin; it must be at least"),
+        ("1e10", "at most 1000 are allowed"),
+    ] {
+        let refused = run(&["modes", &case, "--frequencies", frequencies]);
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        let words: Vec<&str> = refused.stderr.split_whitespace().collect();
+        assert!(words.join(" ").contains(reason), "{refused:?}");
+    }
+}
