@@ -126,6 +126,8 @@ fn unit_start(range: &Range) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use osteon_common::parameters::extended;
+
     use super::*;
 
     fn example() -> SearchBox {
@@ -147,7 +149,7 @@ mod tests {
 
     #[test]
     fn slopes_are_those_along_an_edge() {
-        let slopes = example().per_edge(&[9.0, 1e-9, 9.0, 9.0, 9.0, 9.0, 2.0, 9.0, 9.0, 9.0]);
+        let slopes = example().per_edge(&extended([9.0, 1e-9, 9.0, 9.0, 9.0, 9.0, 2.0], 9.0));
         assert!((slopes[0] - 13.0).abs() < 1e-12 && (slopes[1] - 0.56).abs() < 1e-12);
         assert_eq!(slopes.len(), 2);
     }

@@ -2,12 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
-use osteon_common::case::{Bone, Setup};
+use osteon_common::case::Setup;
 use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::moments::Moments;
 use osteon_common::parameters::Point;
+use osteon_common::pores::{PorosityProfile, ProfileShape};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
-use osteon_common::realization::Ensemble;
+use osteon_common::realization::{Ensemble, mean_bone};
 use osteon_common::settings::SolverSettings;
 use osteon_common::setup_quantity::SetupQuantity;
 use osteon_common::statistics::moments;
@@ -31,16 +32,12 @@ fn quadrature() -> [(f64, f64); 5] {
     nodes.map(|(node, weight)| (3.0_f64.sqrt() * node, weight))
 }
 
-fn mean_bone() -> Bone {
-    let elasticity = MEAN_MODEL.constants().elasticity().unwrap();
-    Bone { density: MEAN_MODEL.density(), elasticity }
-}
-
 fn by_quadrature(setup_at: impl Fn(f64) -> Setup) -> Moments {
-    let (bone, mut workspace) = (mean_bone(), Workspace::default());
-    let rule = quadrature();
+    let (rule, mut workspace) = (quadrature(), Workspace::default());
     let velocities = rule.map(|(node, _)| {
-        Solver::new(&setup_at(node)).arrival(&bone, &mut workspace).unwrap().velocity
+        let setup = setup_at(node);
+        let bone = mean_bone(&MEAN_MODEL, &setup).unwrap();
+        Solver::new(&setup).arrival(&bone, &mut workspace).unwrap().velocity
     });
     let mean_of = |f: &dyn Fn(f64) -> f64| -> f64 {
         velocities.iter().zip(rule).map(|(v, (_, weight))| weight * f(*v)).sum()
@@ -68,6 +65,9 @@ fn check(quantity: SetupQuantity, setup: &Setup, deviation: f64, tolerance: f64)
         SetupQuantity::BoneQualityFactor => random.bone_quality_factor = scatter,
         SetupQuantity::CouplingSoundSpeed => random.coupling_sound_speed = scatter,
         SetupQuantity::ProbeTilt => random.probe_tilt = scatter,
+        SetupQuantity::Porosity => random.porosity = scatter,
+        SetupQuantity::SurfacePorosity => random.surface_porosity = scatter,
+        SetupQuantity::MarrowPorosity => random.marrow_porosity = scatter,
     }
     let mean = quantity.value_in(setup).unwrap();
     let expected = by_quadrature(|node| quantity.with(mean + node * deviation, *setup));
@@ -93,6 +93,16 @@ fn moments_over_random_setups_are_those_of_quadrature_over_fixed_ones() {
     check(SetupQuantity::ProbeTilt, &setup, 0.017_45, 1e-5);
     setup.layers.bone_attenuation.quality_factor = Some(15.0);
     check(SetupQuantity::BoneQualityFactor, &setup, 1.5, 1e-5);
+    let mut setup = Setup::default();
+    setup.pores.porosity = Some(0.1);
+    check(SetupQuantity::Porosity, &setup, 0.02, 1e-5);
+    setup.pores.porosity = None;
+    let PorosityProfile { sublayers, .. } = PorosityProfile::default();
+    let (surface, marrow) = (Some(0.05), Some(0.15));
+    let shape = ProfileShape::Endosteal;
+    setup.pores.profile = PorosityProfile { surface, marrow, shape, sublayers };
+    check(SetupQuantity::SurfacePorosity, &setup, 0.01, 1e-5);
+    check(SetupQuantity::MarrowPorosity, &setup, 0.02, 1e-5);
 }
 
 /// Tables are shared between thick plates, and no bit depends on it: of a case that was used before,

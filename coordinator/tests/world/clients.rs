@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use osteon_common::job::{Data, Group, JobSpecification, Search, SearchMethod};
 use osteon_common::known_quantities::KnownQuantities;
+use osteon_common::parameters::Parameter;
 use osteon_coordinator::core::ids::JobId;
 
 use crate::fake;

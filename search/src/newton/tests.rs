@@ -333,7 +333,7 @@ fn the_dispersion_alone_can_match_data_made_with_the_other_values() {
 /// Returns the lowest cost of one free coordinate, by an exhaustive search.
 fn least_of_one(space: SearchBox, data: Moments) -> f64 {
     let at = |k: u32| space.point(&[f64::from(k) / 100_000.0]);
-    let admissible = (0..=100_000).map(at).filter(admissible);
+    let admissible = (0..=100_000).map(at).filter(|point| admissible(&Pores::default(), point));
     admissible.map(|point| statistics::cost(data, bone(&point))).fold(f64::INFINITY, f64::min)
 }
 

@@ -124,7 +124,10 @@ fn what_is_known_of_a_group_is_in_all_its_points() {
     unknown.search.starts = 2;
     let posterior = PosteriorSettings { max_evaluations: 50, ..PosteriorSettings::default() };
     unknown.posterior = Some(posterior);
-    let values = |set: usize| [Some(3e-3 + 1e-3 * set as f64), None, Some(1480.0)];
+    let values = |set: usize| {
+        let thickness = Some(3e-3 + 1e-3 * set as f64);
+        [None, None, None, thickness, None, Some(1480.0)]
+    };
     let mut known = unknown.clone();
     if let Some(Measurements::Groups(groups)) =
         known.data.as_mut().map(|data| &mut data.measurements)
@@ -142,8 +145,8 @@ fn what_is_known_of_a_group_is_in_all_its_points() {
     assert!(with.history().iter().any(|row| row.role.posterior));
     assert!(with.history().iter().any(|row| row.role.start == 1));
     for (row, other) in with.history().iter().zip(without.history()) {
-        let [thickness, _, speed] = values(row.role.group as usize);
-        assert_eq!(row.point.0[7..], [thickness.unwrap(), 0.0, speed.unwrap()]);
+        let values = values(row.role.group as usize);
+        assert_eq!(row.point.0[7..], values.map(|value| value.unwrap_or(0.0)));
         assert_eq!(row.point.0[..7], other.point.0[..7]);
     }
 }
