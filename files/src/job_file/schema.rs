@@ -47,11 +47,6 @@ pub fn schema() -> String {
         "type": "object",
         "properties": properties,
         "required": ["parameters"],
-        "anyOf": [
-            { "required": [Pores::KEY.name] },
-            { "properties": { "parameters": { "required": [parameters::MATERIAL.name] } } },
-            { "properties": { "parameters": { "required": Parameter::OF_BONE.map(Parameter::name) } } },
-        ],
         "additionalProperties": false,
     });
     format!("{schema:#}\n")
