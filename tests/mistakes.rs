@@ -147,7 +147,7 @@ const JOBS: &[(&str, &str, Words)] = &[
     ("", "[picking]\nextremum = \"1\"\n", &["did you mean \"first\"?"]),
     ("", "[probe]\nfrequency = 1e6\n", &["did you mean `center_frequency`?"]),
     ("", "[probe.receivers]\nnumber = 14\n", &["did you mean `count`?"]),
-    ("", "[bone]\ndensity = 1600.0\n", &["bone: unknown key", "job files [parameters]"]),
+    ("", "[bone]\ndensity = 1600.0\n", &["bone.density: unknown key", "the section [parameters]"]),
     ("[parameters.dispersion]", "[parameters.delta]", &["did you mean `dispersion`?"]),
     ("[data]\nmean = 3906.0\ncoefficient_of_variation = 0.0271\n", "", &["data", "velocities"]),
     ("coefficient_of_variation = 0.0271\n", "", &["coefficient_of_variation"]),

@@ -11,6 +11,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use osteon_common::parameters::Parameter;
 use serde_json::{Map, Value};
 use support::{Scratch, job, run, text};
 
@@ -241,7 +242,7 @@ fn documented_is_real(runs: &Runs) {
             (documented(heading).into_iter().collect(), real.into_iter().collect());
         // Some keys occur only in certain runs, and some columns are named after the free
         // parameters. Quantities of the setup are there if they are searched.
-        let of_setup = ["bone_thickness", "bone_quality_factor", "coupling_sound_speed"];
+        let of_setup = Parameter::OF_SETUP.map(Parameter::name);
         let told: BTreeSet<_> = told
             .into_iter()
             .flat_map(|name| match name.as_str() {

@@ -136,9 +136,6 @@ impl Reader {
                 Suggestion::Section(section) => {
                     format!("unknown key; `{key}` belongs to the section [{section}]")
                 }
-                Suggestion::OfCase => {
-                    "unknown key; case files have [bone], and job files [parameters]".to_owned()
-                }
                 Suggestion::None => format!("unknown key; known here: {}", keys.join(", ")),
             };
             self.violations.add(entry_path(&path, key), message);
@@ -146,7 +143,7 @@ impl Reader {
             match suggestion {
                 Suggestion::Key(name) => self.suggested.push(entry_path(&path, name)),
                 Suggestion::Section(section) => self.suggested.push(entry_path(section, key)),
-                Suggestion::OfCase | Suggestion::None => {}
+                Suggestion::None => {}
             }
         }
         Table { path, entries, is_table: true }

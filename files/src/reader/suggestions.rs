@@ -95,8 +95,6 @@ pub(super) enum Suggestion {
     Key(&'static str),
     /// The same key of this section.
     Section(&'static str),
-    /// A section of case files in a job file.
-    OfCase,
     /// Nothing.
     None,
 }
@@ -104,9 +102,6 @@ pub(super) enum Suggestion {
 /// Returns what `key`, which is none of the keys `known` in the table at `path`, was probably meant to
 /// be.
 pub(super) fn of_key(path: &str, key: &str, known: &[&'static str]) -> Suggestion {
-    if path.is_empty() && key == "bone" {
-        return Suggestion::OfCase;
-    }
     let close = nearest(key, known);
     let alike = close.filter(|&(_, likeness)| likeness >= ALIKE_MIN).map(|(name, _)| name);
     if let Some(name) = alike.or_else(|| meant(key, known, OTHER_NAMES)) {
