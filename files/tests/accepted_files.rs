@@ -4,6 +4,8 @@
 
 #[path = "support/hybrid_job.rs"]
 mod hybrid_job;
+#[path = "support/no_pores.rs"]
+mod no_pores;
 
 use std::path::{Path, PathBuf};
 
@@ -19,8 +21,6 @@ use osteon_common::job::{
 use osteon_common::job::{Sampling, SearchMethod};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Parameter;
-use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
-use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::pulse::{PulseForm, PulseShape};
 use osteon_common::random_quantities::RandomQuantities;
@@ -93,19 +93,7 @@ const DEFAULT_SETUP: Setup = Setup {
         element_order: 8,
         time_step: None,
     },
-    pores: Pores {
-        porosity: None,
-        profile: PorosityProfile {
-            surface: None,
-            marrow: None,
-            shape: ProfileShape::Linear,
-            sublayers: 6,
-        },
-        model: PorosityModel {
-            homogenisation: Homogenisation::MoriTanaka,
-            fluid: PoreFluid { bulk_modulus: 2.3e9, density: 1000.0 },
-        },
-    },
+    pores: no_pores::NO_PORES,
 };
 
 #[test]

@@ -1,0 +1,18 @@
+//! The pores that a job has by default: none.
+
+use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
+use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
+
+pub(crate) const NO_PORES: Pores = Pores {
+    porosity: None,
+    profile: PorosityProfile {
+        surface: None,
+        marrow: None,
+        shape: ProfileShape::Linear,
+        sublayers: 6,
+    },
+    model: PorosityModel {
+        homogenisation: Homogenisation::MoriTanaka,
+        fluid: PoreFluid { bulk_modulus: 2.3e9, density: 1000.0 },
+    },
+};
