@@ -101,7 +101,7 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
 /// Refuses data that no point within the bounds can match even approximately, by the closed form of
 /// √(c1111/ρ) and δ.
 fn within_reach(specification: &JobSpecification, violations: &mut Violations) {
-    let fields = ["data", "parameters", "layers", "probe"];
+    let fields = ["data", "parameters", "layers", "probe", "bone"];
     if fields.iter().any(|field| known_wrong(field, violations)) {
         return;
     }
