@@ -55,6 +55,9 @@ def kind(lines, name, value):
     """The type of a value; those of tables are added."""
     if "enum" in value:
         return f"Literal[{', '.join(map(json.dumps, value['enum']))}]"
+    if "anyOf" in value:
+        forms = [{"description": value["description"], **form} for form in value["anyOf"]]
+        return " | ".join(kind(lines, name, form) for form in forms)
     if value["type"] == "array":
         return f"Sequence[{kind(lines, name, value['items'])}]"
     if value["type"] == "object":
