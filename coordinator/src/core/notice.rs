@@ -80,7 +80,7 @@ pub enum Notice {
         /// Time since its acceptance.
         elapsed: Duration,
     },
-    /// A warning of [`core::concerns`](crate::core::concerns) has become due.
+    /// A warning of `core/concerns.rs` has become due.
     Concern {
         /// A sentence.
         text: String,
