@@ -109,9 +109,9 @@ fn thick_and_thin_plates_have_the_velocities_of_a_face_and_of_a_membrane() {
     let shear = across(&bone)[0];
     let face = shear * (2.0 - 2.0 / 3.0f64.sqrt()).sqrt();
     let membrane = (young / (1.0 - poisson * poisson) / bone.density).sqrt();
-    // Both faces know of each other by exp(-32); the square of kh is 1e-6.
+    // Both faces know of each other by exp(-32). The membrane is slower by (kh)² ν²/(24 (1 - ν)²) = 1.7e-4.
     for (name, scaled, expected, limit) in
-        [("A0", 12.0, face, 1e-10), ("S0", 12.0, face, 1e-10), ("S0", 2e-4, membrane, 1e-6)]
+        [("A0", 12.0, face, 1e-10), ("S0", 12.0, face, 1e-10), ("S0", 0.05, membrane, 2e-4)]
     {
         let found = modes(&bone, thickness, scaled * shear / thickness);
         let mode = found.iter().find(|mode| mode.name.as_deref() == Some(name)).unwrap();
