@@ -114,3 +114,22 @@ fn frequencies_that_cannot_be_meant_are_refused() {
         assert!(words.join(" ").contains(reason), "{refused:?}");
     }
 }
+
+/// A stack of fluids is no half-space: the waves are those in a vacuum, or none.
+#[test]
+fn a_stack_of_fluids_is_refused_with_what_to_do() {
+    let scratch = Scratch::new();
+    let marrow = "layers.marrow={ sublayers = [{ thickness = 3e-3, density = 980.0, sound_speed = 1450.0 }, \
+                  { thickness = 8e-3, density = 1050.0, sound_speed = 1540.0 }] }";
+    let case = example("A.toml");
+    let out = scratch.path("modes");
+    let arguments = ["modes", &case, "--set", marrow, "--out", text(&out)];
+    let refused = run(&[&arguments[..], &["--in-fluids"]].concat());
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    let words: Vec<&str> = refused.stderr.split_whitespace().collect();
+    let reason =
+        "layers.marrow.sublayers: guided waves are known between half-spaces of one fluid each";
+    assert!(words.join(" ").contains(reason), "{refused:?}");
+    assert!(!out.exists());
+    run(&arguments).succeeded();
+}

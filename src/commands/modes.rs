@@ -38,9 +38,11 @@ pub(super) async fn modes(arguments: ModesArguments, isa: Isa, cores: u32) -> En
     let compute = move || BandModes::compute(&case, surroundings, &frequencies, isa, threads);
     let computed = tokio::task::spawn_blocking(compute).await.map_err(CommandFailure::failed)?;
     let modes = computed.map_err(|error| match error {
-        BandModesError::Modes(ModesError::TooLow { .. } | ModesError::TooMany { .. }) => {
-            CommandFailure::bad_input(error)
-        }
+        BandModesError::Modes(
+            ModesError::TooLow { .. }
+            | ModesError::TooMany { .. }
+            | ModesError::SeveralFluids { .. },
+        ) => CommandFailure::bad_input(error),
         _ => CommandFailure::failed(error),
     })?;
     if let Some(directory) = &out {

@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 use faer::c64;
 use osteon_common::bone::{BoneRef, Sublayers};
 use osteon_common::case::Setup;
-use osteon_solver::{FluidModes, Mode, Solver};
+use osteon_common::fluid_sublayers::{FluidSublayer, FluidSublayers};
+use osteon_solver::{FluidModes, Mode, ModesError, Solver};
 
 use super::finite_elements::FiniteElements;
 use super::{across, draw, isotropic, optimum, stack};
@@ -138,4 +139,19 @@ fn every_wave_is_one_of_finite_elements_with_loads() {
             }
         }
     }
+}
+
+/// A fluid that is divided is one half-space; a stack of fluids is none.
+#[test]
+fn only_single_fluids_are_half_spaces() {
+    let mut setup = setup(2e-3, [1000.0, 950.0], None);
+    let expected = fluid_modes(&setup, &optimum(), 0.7e6);
+    let marrow = FluidSublayer { thickness: 4e-3, density: 950.0, sound_speed: 1400.0 };
+    setup.layers.marrow = Setup::default().layers.marrow;
+    setup.layers.marrow.sublayers = FluidSublayers::new(&[marrow; 2]).unwrap();
+    assert_eq!(fluid_modes(&setup, &optimum(), 0.7e6), expected);
+    let fat = FluidSublayer { sound_speed: 1440.0, ..marrow };
+    setup.layers.marrow.sublayers = FluidSublayers::new(&[marrow, fat]).unwrap();
+    let refused = Solver::new(&setup).modes_in_fluids(&optimum(), 0.7e6);
+    assert_eq!(refused, Err(ModesError::SeveralFluids { field: "layers.marrow.sublayers" }));
 }

@@ -7,7 +7,8 @@
 
 use std::f64::consts::TAU;
 
-use osteon_common::layers::{Fluid, Layers};
+use osteon_common::fluid_sublayers::FluidSublayer;
+use osteon_common::layers::Layers;
 
 use super::complex_plate::WaveDeterminant;
 use super::contour::zeros_within;
@@ -34,7 +35,10 @@ pub(super) type Radiation = [bool; 2];
 pub(super) struct FluidBone<'a> {
     pub(super) isa: Isa,
     pub(super) media: &'a Media,
+    /// The layers, of which the attenuation is used.
     pub(super) layers: &'a Layers,
+    /// The fluids above and below.
+    pub(super) fluids: [FluidSublayer; 2],
     /// The components of the displacement.
     pub(super) components: &'a [usize],
     pub(super) radiation: Radiation,
@@ -47,10 +51,9 @@ pub(super) struct FluidBone<'a> {
 impl FluidBone<'_> {
     /// Returns a function of k (rad/m) without poles that is zero where the bone has a wave.
     pub(super) fn determinant(&self, k: Complex) -> Scaled {
-        let layers = self.shared_layers();
         let s = Complex::new(0.0, self.omega);
-        let lossless = LosslessFrequencies::at(&layers, s);
-        let load = |fluid: &Fluid, frequency: Complex, radiates: bool| {
+        let lossless = LosslessFrequencies::at(&self.layers_of_share(), s);
+        let load = |fluid: &FluidSublayer, frequency: Complex, radiates: bool| {
             let over_c = frequency.scale(1.0 / fluid.sound_speed);
             let square = k * k + over_c * over_c;
             // e^(iωt - gx3): a wave that leaves has a positive imaginary part of g.
@@ -60,20 +63,20 @@ impl FluidBone<'_> {
             } else {
                 square.sqrt()
             };
-            (s * s).scale(fluid.density) / g * lossless.bone_compliance
+            (s * s).scale(fluid.density * self.share) / g * lossless.bone_compliance
         };
+        let [coupling, marrow] = &self.fluids;
         let loads = [
-            load(&layers.coupling, lossless.coupling, self.radiation[0]),
-            load(&layers.marrow, lossless.marrow, self.radiation[1]),
+            load(coupling, lossless.coupling, self.radiation[0]),
+            load(marrow, lossless.marrow, self.radiation[1]),
         ];
         let Self { isa, media, components, .. } = *self;
         isa.run(WaveDeterminant { media, components, s: lossless.bone, k, loads })
     }
 
-    fn shared_layers(&self) -> Layers {
+    /// Returns the layers with their share of the loss.
+    fn layers_of_share(&self) -> Layers {
         let mut layers = *self.layers;
-        layers.coupling.density *= self.share;
-        layers.marrow.density *= self.share;
         for attenuation in [
             &mut layers.coupling.attenuation,
             &mut layers.bone_attenuation,

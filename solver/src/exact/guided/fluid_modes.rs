@@ -3,6 +3,8 @@
 use std::f64::consts::TAU;
 
 use osteon_common::bone::BoneRef;
+use osteon_common::fluid_sublayers::{FluidSublayer, FluidSublayers};
+use osteon_common::layers::Layers;
 
 use super::fluid_bone::{FluidBone, Radiation};
 use super::modes::{FreeModes, Mode, ModesError};
@@ -47,15 +49,17 @@ impl Solver {
     /// principle.
     ///
     /// # Errors
-    /// As [`Solver::modes`].
+    /// As [`Solver::modes`], and if coupling or marrow is a stack of several fluids, which is no half-space.
     pub fn modes_in_fluids<'a>(
         &self,
         bone: impl Into<BoneRef<'a>>,
         frequency: f64,
     ) -> Result<FluidModes, ModesError> {
+        let layers = &self.setup().layers;
+        let fluids = half_spaces(layers)?;
         let free = FreeModes::new(self, bone.into(), frequency)?;
-        let (omega, layers) = (TAU * frequency, &self.setup().layers);
-        let sound = [layers.coupling.sound_speed, layers.marrow.sound_speed].map(|c| omega / c);
+        let omega = TAU * frequency;
+        let sound = fluids.map(|fluid| omega / fluid.sound_speed);
         let mut found = FluidModes { modes: Vec::new(), lost: Vec::new(), others: Some(0) };
         for components in &free.components {
             for radiation in [[false, false], [false, true], [true, false], [true, true]] {
@@ -64,6 +68,7 @@ impl Solver {
                     isa: self.isa(),
                     media: &free.media,
                     layers,
+                    fluids,
                     components,
                     radiation,
                     omega,
@@ -81,6 +86,18 @@ impl Solver {
         found.lost.sort_by(|a, b| a.phase_velocity.total_cmp(&b.phase_velocity));
         Ok(found)
     }
+}
+
+/// Returns the fluids above and below the bone.
+fn half_spaces(layers: &Layers) -> Result<[FluidSublayer; 2], ModesError> {
+    let single = |fluids: FluidSublayers, field| match *fluids.as_slice() {
+        [fluid] => Ok(fluid),
+        _ => Err(ModesError::SeveralFluids { field }),
+    };
+    Ok([
+        single(layers.coupling_fluids(), "layers.coupling.sublayers")?,
+        single(layers.marrow_fluids(), "layers.marrow.sublayers")?,
+    ])
 }
 
 /// Returns the wavenumbers (rad/m) of waves that radiate where this says; `None` if there are none.
@@ -126,7 +143,7 @@ fn add_followed(bone: &FluidBone<'_>, waves: &[&Mode], range: [f64; 2], found: &
             ..(*wave).clone()
         });
     }
-    let margin = BESIDE * range[1].min(bone.omega / bone.layers.coupling.sound_speed);
+    let margin = BESIDE * range[1].min(bone.omega / bone.fluids[0].sound_speed);
     let strip = [
         Complex::new(range[0] + 1e-3 * margin, -BEYOND * deepest - margin),
         Complex::new(range[1] - 1e-3 * margin, margin),

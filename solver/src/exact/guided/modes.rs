@@ -68,6 +68,15 @@ pub enum ModesError {
         /// Number of the family's waves that begin at lower frequencies.
         count: u64,
     },
+    /// The bone does not lie between half-spaces of one fluid each.
+    #[error(
+        "{field}: guided waves are known between half-spaces of one fluid each, not in a stack of fluids; give one \
+         fluid, or ask for the waves in a vacuum"
+    )]
+    SeveralFluids {
+        /// The field, `layers.coupling.sublayers` or `layers.marrow.sublayers`.
+        field: &'static str,
+    },
     /// A number is not finite, or waves nearly stand still in too many places.
     #[error(
         "frequency: the waves at {frequency} Hz cannot be told apart; a number is out of scale"
