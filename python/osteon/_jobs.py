@@ -176,7 +176,11 @@ class Job:
         return "identification" if self._has_data else "propagation"
 
     def ensemble(self) -> Ensemble:
-        """The random bones at the fixed values and starts, to the bit those of `osteon draw`.
+        """The random bones at the fixed values and starts, to the bit those of `osteon draw`; with a porosity
+        they are those with pores.
+
+        Raises:
+            InputError: the porosity changes through the thickness.
 
         >>> import osteon
         >>> osteon.Job.read("examples/fast.toml").ensemble().draw(4).shape

@@ -1,6 +1,8 @@
 //! Random elasticity tensors, to the bit those of a job.
 
 use numpy::{PyArray1, PyArray3, PyArrayMethods as _};
+use osteon_common::bone::CaseBone;
+use osteon_common::case::Setup;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::ensemble::{ElasticityLaw, Germs};
 use osteon_common::realization::Ensemble;
@@ -18,22 +20,39 @@ pub(crate) struct PyEnsemble {
 enum Bones {
     /// Any mean, with independent germs.
     Law { law: Box<ElasticityLaw>, seed: u64 },
-    /// The start of a job, with its germs.
-    Job(Box<Ensemble>),
+    /// The start of a job, with its germs and its setup.
+    Job { ensemble: Box<Ensemble>, setup: Box<Setup> },
 }
 
 impl PyEnsemble {
-    /// Creates the ensemble of a job.
-    pub(crate) fn of_job(ensemble: Ensemble) -> Self {
-        Self { source: Bones::Job(Box::new(ensemble)) }
+    /// Creates the ensemble of a job with this setup.
+    ///
+    /// # Errors
+    /// If its bones have several tensors each.
+    pub(crate) fn of_job(ensemble: Ensemble, setup: Setup) -> PyResult<Self> {
+        if setup.pores.profile.ends().is_some() {
+            let message = "changes through the thickness, so that each sublayer of a realization has a tensor of \
+                           its own; `osteon draw` writes all of them";
+            return Err(errors::bad_input("bone.porosity", message));
+        }
+        let (ensemble, setup) = (Box::new(ensemble), Box::new(setup));
+        Ok(Self { source: Bones::Job { ensemble, setup } })
     }
 
     fn tensor(&self, index: u64) -> Result<Elasticity, String> {
-        let drawn = match &self.source {
-            Bones::Law { law, seed } => law.realize(&Germs::draw(*seed, index)),
-            Bones::Job(ensemble) => ensemble.bone(index).map(|bone| bone.elasticity),
-        };
-        drawn.map_err(|error| format!("the tensor of realization {index} {error}"))
+        let refused = |error: String| format!("the tensor of realization {index} {error}");
+        match &self.source {
+            Bones::Law { law, seed } => {
+                law.realize(&Germs::draw(*seed, index)).map_err(|error| refused(error.to_string()))
+            }
+            Bones::Job { ensemble, setup } => {
+                let drawn = ensemble.realization(index, setup);
+                match drawn.map_err(|error| refused(error.to_string()))?.bone {
+                    CaseBone::Homogeneous(bone) => Ok(bone.elasticity),
+                    CaseBone::Layered(_) => Err(refused("is one of each sublayer".to_owned())),
+                }
+            }
+        }
     }
 }
 

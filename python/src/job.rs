@@ -88,7 +88,7 @@ impl PyJob {
         let ensemble = specification
             .ensemble(&specification.start())
             .map_err(|error| errors::bad_input("parameters", error.to_string()))?;
-        Ok(PyEnsemble::of_job(ensemble))
+        PyEnsemble::of_job(ensemble, specification.setup)
     }
 
     /// Copies and pickles it as its complete job file.

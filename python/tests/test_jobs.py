@@ -89,6 +89,25 @@ class Run(TestCase):
         with self.assertRaises(osteon.InputError):
             other.propagate(out=out, progress=False)
 
+    def test_an_ensemble_has_the_pores_of_its_job(self) -> None:
+        job = osteon.Job(
+            bone={"porosity": 0.1},
+            parameters={"dispersion": {"fixed": 0.1}},
+            monte_carlo={"realizations": 20},
+        )
+        velocities = job.propagate(progress=False).table("realizations")["velocity"]
+        # Density of the default matrix, of which a tenth is water.
+        density = 0.9 * 1665.33 + 0.1 * 1000.0
+        np.testing.assert_array_equal(
+            osteon.velocities(job.ensemble().draw(20), density=density), velocities
+        )
+        profile = osteon.Job(
+            bone={"porosity": {"surface": 0.05, "marrow": 0.15}},
+            parameters={"dispersion": {"fixed": 0.1}},
+        )
+        with self.assertRaisesRegex(osteon.InputError, "bone.porosity.*changes through the thickness"):
+            profile.ensemble()
+
     def test_the_address_in_the_environment_is_not_used(self) -> None:
         os.environ["OSTEON_COORDINATOR"] = "http://127.0.0.1:9"
         self.addCleanup(os.environ.pop, "OSTEON_COORDINATOR")
