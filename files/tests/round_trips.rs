@@ -76,6 +76,8 @@ fn setup() -> impl Strategy<Value = Setup> {
                 attenuations = [Attenuation::default(); 3];
             }
             let bone_attenuation = attenuations[1];
+            // Elements of a width are computed in one fluid alone.
+            let element_width = if coupling.sublayers.is_empty() { pulse.3 * pitch } else { 0.0 };
             (coupling.attenuation, marrow.attenuation) = (attenuations[0], attenuations[2]);
             Setup {
                 layers: Layers { coupling, bone_thickness, bone_attenuation, marrow },
@@ -83,7 +85,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                     center_frequency: pulse.0,
                     amplitude: pulse.1,
                     pulse: pulse.2,
-                    element_width: pulse.3 * pitch,
+                    element_width,
                     source: Source { x1, x3 },
                     receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },
                     // Heights change by a few micrometres.
