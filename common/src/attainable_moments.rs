@@ -206,7 +206,7 @@ impl MomentKind {
 struct Unattainable {
     moment: MomentKind,
     value: f64,
-    /// What the bounds allow, and what to do.
+    /// End of the message: the range within the bounds, and what the user can do.
     advice: String,
 }
 

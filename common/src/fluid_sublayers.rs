@@ -16,7 +16,7 @@ pub struct FluidSublayer {
 }
 
 impl FluidSublayer {
-    /// What a place holds that is not in use.
+    /// Value of the places after the last sublayer.
     const NONE: Self = Self { thickness: 0.0, density: 0.0, sound_speed: 0.0 };
 
     fn is_same_fluid(&self, other: &Self) -> bool {
@@ -155,29 +155,30 @@ impl List for FluidSublayers {
 
 impl Section for FluidSublayer {
     fn declare(&mut self, fields: &mut dyn Fields) {
-        fields.number(
-            Key { name: "thickness", meaning: "thickness of the sublayer" },
-            &mut self.thickness,
-            Number::above_zero(&FLUID_THICKNESS),
-        );
-        fields.number(
-            Key { name: "density", meaning: "mass density" },
-            &mut self.density,
-            Number::above_zero(&FLUID_DENSITY),
-        );
-        fields.number(
-            Key { name: "sound_speed", meaning: "speed of sound" },
-            &mut self.sound_speed,
-            Number::above_zero(&SOUND_SPEED),
-        );
+        let Self { thickness, density, sound_speed } = self;
+        declare_fluid("thickness of the sublayer", [thickness, density, sound_speed], fields);
     }
+}
+
+/// Declares thickness, density and speed of sound of one fluid.
+pub(crate) fn declare_fluid(
+    thickness_meaning: &'static str,
+    [thickness, density, sound_speed]: [&mut f64; 3],
+    fields: &mut dyn Fields,
+) {
+    let key = Key { name: "thickness", meaning: thickness_meaning };
+    fields.number(key, thickness, Number::above_zero(&FLUID_THICKNESS));
+    let key = Key { name: "density", meaning: "mass density" };
+    fields.number(key, density, Number::above_zero(&FLUID_DENSITY));
+    let key = Key { name: "sound_speed", meaning: "speed of sound" };
+    fields.number(key, sound_speed, Number::above_zero(&SOUND_SPEED));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn of(all: &[(f64, f64)]) -> FluidSublayers {
+    fn fluids(all: &[(f64, f64)]) -> FluidSublayers {
         let one =
             |&(thickness, sound_speed)| FluidSublayer { thickness, density: 1000.0, sound_speed };
         FluidSublayers::new(&all.iter().map(one).collect::<Vec<_>>()).unwrap()
@@ -185,17 +186,20 @@ mod tests {
 
     #[test]
     fn neighbours_of_one_fluid_are_one_sublayer() {
-        let given = of(&[(1e-3, 1500.0), (2e-3, 1500.0), (1e-3, 1450.0), (1e-3, 1500.0)]);
-        assert_eq!(given.merged(), of(&[(1e-3 + 2e-3, 1500.0), (1e-3, 1450.0), (1e-3, 1500.0)]));
-        assert_eq!(of(&[(2.5e-3, 1500.0); 4]).merged(), of(&[(10e-3, 1500.0)]));
+        let given = fluids(&[(1e-3, 1500.0), (2e-3, 1500.0), (1e-3, 1450.0), (1e-3, 1500.0)]);
+        assert_eq!(
+            given.merged(),
+            fluids(&[(1e-3 + 2e-3, 1500.0), (1e-3, 1450.0), (1e-3, 1500.0)])
+        );
+        assert_eq!(fluids(&[(2.5e-3, 1500.0); 4]).merged(), fluids(&[(10e-3, 1500.0)]));
         assert_eq!(given.reversed().reversed(), given);
     }
 
     #[test]
     fn a_part_of_the_fluids_has_their_thicknesses() {
-        let given = of(&[(1.0, 1500.0), (2.0, 1450.0), (1.0, 1600.0)]);
+        let given = fluids(&[(1.0, 1500.0), (2.0, 1450.0), (1.0, 1600.0)]);
         let check = |from, to, expected: &[(f64, f64)]| {
-            assert_eq!(given.between(from, to), of(expected), "{from} to {to}");
+            assert_eq!(given.between(from, to), fluids(expected), "{from} to {to}");
         };
         check(0.0, 4.0, &[(1.0, 1500.0), (2.0, 1450.0), (1.0, 1600.0)]);
         check(0.5, 1.5, &[(0.5, 1500.0), (0.5, 1450.0)]);

@@ -2,8 +2,8 @@
 
 use crate::attenuation::Attenuation;
 use crate::fields::{Condition, Fields, Key, Number, Section};
-use crate::fluid_sublayers::{FluidSublayer, FluidSublayers};
-use crate::plausible::{BONE_THICKNESS, FLUID_DENSITY, FLUID_THICKNESS, SOUND_SPEED};
+use crate::fluid_sublayers::{FluidSublayer, FluidSublayers, declare_fluid};
+use crate::plausible::BONE_THICKNESS;
 
 /// A fluid layer, unbounded along x1 and x2: one fluid, or sublayers of different ones.
 /// [`Layers::coupling_fluids`] and [`Layers::marrow_fluids`] return the fluids of either.
@@ -132,21 +132,8 @@ impl Section for Fluid {
                     .to_owned(),
         };
         fields.only_if(&condition, &mut |fields| {
-            fields.number(
-                Key { name: "thickness", meaning: "thickness of the layer" },
-                &mut self.thickness,
-                Number::above_zero(&FLUID_THICKNESS),
-            );
-            fields.number(
-                Key { name: "density", meaning: "mass density" },
-                &mut self.density,
-                Number::above_zero(&FLUID_DENSITY),
-            );
-            fields.number(
-                Key { name: "sound_speed", meaning: "speed of sound" },
-                &mut self.sound_speed,
-                Number::above_zero(&SOUND_SPEED),
-            );
+            let numbers = [&mut self.thickness, &mut self.density, &mut self.sound_speed];
+            declare_fluid("thickness of the layer", numbers, fields);
         });
         let key = Key { name: "attenuation", meaning: "attenuation of sound in the fluid" };
         fields.table(key, &mut |fields| self.attenuation.declare(fields));

@@ -17,7 +17,7 @@ fields::choices!(ProfileShape);
 /// Numbers of sublayers that a linear profile may have.
 pub const SUBLAYERS: WholeRange = WholeRange::new(2, SUBLAYERS_MAX as u64);
 /// Key of the profile on the wire.
-pub const PROFILE: &str = "profile";
+const PROFILE: &str = "profile";
 /// Relative step of the difference quotients of ln √(c1111/ρ), whose error is its square.
 const STEP: f64 = 1e-5;
 
@@ -131,8 +131,8 @@ impl Pores {
         }
     }
 
-    /// Returns the mean solid at a point: density and mean elasticity of the bone. Where the porosity changes through
-    /// the thickness, it is that of the mean porosity.
+    /// Returns the mean solid at a point: density and mean elasticity of the bone. Where the porosity changes
+    /// through the thickness, it is that of the mean porosity.
     ///
     /// # Errors
     /// If the mean model of the point is not admissible, or has no stiffness with these pores.

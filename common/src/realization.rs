@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use crate::bone::CaseBone;
-use crate::case::{Bone, Setup};
+use crate::case::{Bone, Case, Setup};
 use crate::elasticity::{Inadmissible, NotElastic};
 use crate::ensemble::{ElasticityLaw, LawError};
 use crate::germ_source::{GermMaker, GermSource};
@@ -62,6 +62,13 @@ pub enum NoBone {
 /// If the mean model is not admissible, or has no stiffness with the pores of the setup.
 pub fn mean_bone(point: &Point, setup: &Setup) -> Result<CaseBone, NoPorousBone> {
     setup.pores.bone(&point.mean_model(), setup.layers.bone_thickness, Ok)
+}
+
+impl Realization {
+    /// Returns it as a case, whose setup is `given` unless it has its own.
+    pub fn into_case(self, given: &Setup) -> Case {
+        Case { setup: self.own_setup.unwrap_or(*given), bone: self.bone }
+    }
 }
 
 impl Ensemble {
@@ -127,7 +134,8 @@ impl Ensemble {
         Ok(Realization { own_setup, bone })
     }
 
-    /// Returns the bone at `index` of a setup without pores.
+    /// Returns the bone at `index` of a setup without pores. What may have some needs
+    /// [`Ensemble::realization`].
     ///
     /// # Errors
     /// If the drawn matrix is not positive definite within rounding (see

@@ -238,9 +238,9 @@ impl WaveSampling {
     pub fn for_speed_bin(setup: &Setup, bin: usize, grade: Grade, faces: OuterFaces) -> Self {
         let speed = speed_bin_edge(setup, bin);
         let (fc, pulse) = (setup.probe.center_frequency, &setup.probe.pulse);
-        // All in periods, for the paper's pulse: length of the reflected wave; latest time of a picked extremum after the
-        // earliest possible arrival; latest time for which the wave of a repeated source must be
-        // kept out.
+        // All in periods, for the paper's pulse: length of the reflected wave; latest time of a picked
+        // extremum after the earliest possible arrival; latest time for which the wave of a repeated source
+        // must be kept out.
         let (reflected_length, latest_pick, latest_source) = match grade {
             Grade::Quick | Grade::Plain => (1.0, QUICK_LATEST, QUICK_LATEST),
             Grade::Thorough | Grade::Full => (4.0, 2.5, f64::INFINITY),

@@ -58,7 +58,7 @@ pub enum FileError {
         path: PathBuf,
         /// Maximum number of bytes.
         max_bytes: u64,
-        /// What this suffices for.
+        /// End of the message, after "more than", such as `any case file needs`.
         suffices_for: &'static str,
     },
     /// The text is refused.
@@ -240,7 +240,8 @@ impl fmt::Display for Invalid {
 pub(crate) struct SizeLimit {
     /// Maximum number of bytes.
     pub(crate) bytes: u64,
-    /// What this suffices for, and perhaps what else can be done: it follows "more than" in the message.
+    /// End of the message about a larger file, after "more than", such as `any case file needs`; it may also say
+    /// what the user can do.
     pub(crate) suffices_for: &'static str,
 }
 

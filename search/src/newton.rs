@@ -115,9 +115,9 @@ enum SlopeRefresh {
 pub struct Newton {
     settings: Settings,
     data: ComparedMoments,
-    /// The first axis whose slopes are always measured: that of a parameter of the setup, which all come
-    /// last, because the closed form does not contain them (but porosities); or the first of all, because it does not
-    /// contain other observables.
+    /// The first axis whose slopes are always measured. The closed form contains the bone's parameters and the
+    /// porosities; other parameters of the setup come after them. With other observables, which it does not
+    /// contain, it is the first axis of all.
     first_unknown: usize,
     /// Point from which distances are measured: the start, later a point near the solution.
     centre: Vec<f64>,

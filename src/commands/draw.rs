@@ -1,9 +1,7 @@
 //! `draw`: one realization of a job as a complete case file.
 
 use anyhow::anyhow;
-use osteon_common::case::Case;
 use osteon_common::job::JobKind;
-use osteon_common::realization::Realization;
 use osteon_files::{case_file, job_file};
 
 use crate::arguments::DrawArguments;
@@ -33,9 +31,7 @@ pub(super) fn draw(arguments: &DrawArguments) -> Ended {
             "realization {index} has no finite elasticity matrix (failure not_finite)"
         )))
     })?;
-    let Realization { own_setup, bone } = drawn;
-    let setup = own_setup.unwrap_or(specification.setup);
-    let text = case_file::to_toml(&Case { setup, bone });
+    let text = case_file::to_toml(&drawn.into_case(&specification.setup));
     output::stdout(OutputFormat::Text).verbatim(&text).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }

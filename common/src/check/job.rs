@@ -85,12 +85,11 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
         return;
     }
     let (start, pores) = (specification.start(), &specification.setup.pores);
+    let is_known = !["bone", "parameters"].iter().any(|field| violations.has_at_or_below(field));
     let refused = match start.constants().elasticity() {
         Err(inadmissible) => Some(inadmissible.to_string()),
-        Ok(_) if ["bone", "parameters"].iter().any(|field| violations.has_at_or_below(field)) => {
-            None
-        }
-        Ok(_) => pores.mean_solid(&start).err().map(|none| none.to_string()),
+        Ok(_) if is_known => pores.mean_solid(&start).err().map(|none| none.to_string()),
+        Ok(_) => None,
     };
     if let Some(refused) = refused {
         let message = format!("the point of starts and fixed values is not admissible: {refused}");

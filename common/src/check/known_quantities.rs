@@ -9,7 +9,7 @@ use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::violations::{Violation, Violations};
 
-use super::random_quantities::{OF_SETUP, random_quantities};
+use super::random_quantities::{SETUP_SECTIONS, random_quantities};
 use super::setup::setup as check_setup;
 
 /// Checks that every group has the same quantities, none of which is searched, and that their values
@@ -64,7 +64,7 @@ fn values(
     origin: Option<&Origin>,
     violations: &mut Violations,
 ) {
-    if OF_SETUP.iter().any(|section| violations.has_at_or_below(section))
+    if SETUP_SECTIONS.iter().any(|section| violations.has_at_or_below(section))
         || violations.has_at_or_below("random")
     {
         return;

@@ -10,8 +10,8 @@ use super::section::section;
 use super::setup::setup as check_setup;
 use super::value::known_wrong;
 
-/// Sections of which each realization has one of its own.
-pub(super) const OF_SETUP: [&str; 5] = ["layers", "probe", "picking", "solver", "bone"];
+/// The sections of a job file that make the setup.
+pub(super) const SETUP_SECTIONS: [&str; 5] = ["layers", "probe", "picking", "solver", "bone"];
 
 /// Records all violations of `random`, whose means are in `setup`, which has been checked.
 ///
@@ -20,7 +20,7 @@ pub(super) const OF_SETUP: [&str; 5] = ["layers", "probe", "picking", "solver", 
 pub fn random_quantities(random: &RandomQuantities, setup: &Setup, violations: &mut Violations) {
     let (mut checked, mut default) = (*random, RandomQuantities::default());
     section("random", &mut checked, &mut default, violations);
-    if OF_SETUP.iter().any(|section| violations.has_at_or_below(section)) {
+    if SETUP_SECTIONS.iter().any(|section| violations.has_at_or_below(section)) {
         return;
     }
     for quantity in random.random() {

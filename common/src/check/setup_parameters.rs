@@ -6,7 +6,7 @@ use crate::parameters::{AS_IN_SETUP, Parameter};
 use crate::setup_quantity::SetupQuantity;
 use crate::violations::{Violation, Violations};
 
-use super::random_quantities::{OF_SETUP, random_quantities};
+use super::random_quantities::{SETUP_SECTIONS, random_quantities};
 use super::range::range;
 use super::setup::setup as check_setup;
 use super::value::known_wrong;
@@ -33,7 +33,7 @@ pub(super) fn setup_parameters(specification: &JobSpecification, violations: &mu
             searched @ Range::Free { lower, upper, .. } => {
                 range(parameter, searched, violations);
                 let wrong = |field: &str| violations.has_at_or_below(field);
-                if !OF_SETUP.iter().any(|field| wrong(field)) && !wrong(&path) {
+                if !SETUP_SECTIONS.iter().any(|field| wrong(field)) && !wrong(&path) {
                     ends(quantity, [lower, upper], &path, specification, violations);
                 }
             }

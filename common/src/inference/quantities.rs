@@ -128,8 +128,7 @@ impl Quantities<'_> {
     fn logarithm_at(&self, parameter: Parameter, value: f64) -> f64 {
         let mut point = self.best.point;
         point.0[parameter as usize] = value;
-        let velocity = self.specification.setup.pores.bulk_velocity(&point);
-        velocity.map_or(f64::INFINITY, |found| found.logarithm)
+        self.specification.setup.pores.bulk_logarithm(&point).unwrap_or(f64::INFINITY)
     }
 
     /// Returns a parameter whose interval ends where its law does, or its values.

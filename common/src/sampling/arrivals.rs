@@ -40,7 +40,7 @@ pub fn earliest_arrival(setup: &Setup, place: Place, speed: f64) -> f64 {
         }
         _ => {
             let speed = fastest_way(&fluids, speed);
-            place.x / speed + path.delay(speed) - lead(setup, speed)
+            place.x / speed + path.delay(speed) - lead(setup, &path, speed)
         }
     }
 }
@@ -111,11 +111,11 @@ pub(super) fn last_reflected_arrival(setup: &Setup, place: Place) -> f64 {
     path.ray(place.x) + setup.probe.element_width / path.slowest()
 }
 
-/// Returns at most how much earlier, s, than between their middles a wave travels between the ends of two
-/// elements. Only those in one fluid have a width.
-fn lead(setup: &Setup, speed: f64) -> f64 {
+/// Returns at most how much earlier, s, than between their middles a wave on this path travels between the
+/// ends of two elements. Only those in one fluid have a width.
+fn lead(setup: &Setup, path: &FluidPath, speed: f64) -> f64 {
     let (along, upwards) = setup.probe.element_extent();
-    along / speed + upwards.abs() * slowness(by_the_bone(setup).slowest(), speed)
+    along / speed + upwards.abs() * slowness(path.slowest(), speed)
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the coupling's outer face.
@@ -123,7 +123,7 @@ pub(super) fn upper_echo(setup: &Setup, place: Place, speed: f64) -> f64 {
     let fluids = setup.layers.coupling_fluids();
     let path = FluidPath::by_the_outer_face(&fluids, setup.probe.source.x3, place.x3);
     let speed = fastest_way(&fluids, speed);
-    place.x / speed + path.delay(speed) - lead(setup, speed)
+    place.x / speed + path.delay(speed) - lead(setup, &path, speed)
 }
 
 /// Returns the earliest possible arrival, s, of a wave by way of the marrow's outer face.

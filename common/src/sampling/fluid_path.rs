@@ -1,9 +1,9 @@
 //! Paths through the fluids above the bone: how far each of them is crossed, and the earliest arrival of a
 //! wave that does so.
 //!
-//! Of a path with lengths d_j across fluids of speeds c_j, and with the distance x along them, the travel time is
-//! at least p x + Σ d_j √(1/c_j² - p²) at every slowness p along x1 up to that of the fastest medium on
-//! it; the largest of these bounds is attained.
+//! A path crosses lengths d_j of fluids with speeds of sound c_j, and goes the distance x along them. Its travel
+//! time is at least p x + Σ d_j √(1/c_j² - p²), for every slowness p along x1 from 0 to that of the fastest
+//! medium on the path. With the slowness of its ray the bound is the travel time itself.
 
 use crate::fluid_sublayers::{FluidSublayer, FluidSublayers};
 use crate::limits::FLUID_SUBLAYERS_MAX;

@@ -50,7 +50,7 @@ pub(crate) struct FailureReporter(watch::Sender<Health>);
 /// Held by a part of a coordinator while it runs; reports its end, by panic or otherwise.
 #[derive(Debug)]
 pub(crate) struct Guard {
-    /// What the end of this part is reported as.
+    /// The failure that is reported when this part ends.
     failure: ComponentFailure,
     reporter: FailureReporter,
 }

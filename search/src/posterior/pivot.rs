@@ -23,9 +23,9 @@ pub(super) struct Pivots {
 
 impl Pivots {
     /// Chooses the pivots among the free parameters: for the mean velocity the one whose prior
-    /// leaves it most uncertain, at the point `at` of the other medians, of a bone with these pores. The longitudinal Young
-    /// modulus is chosen only if there is no other, because up to two of its values give the same
-    /// velocity.
+    /// leaves it most uncertain, at the point `at` of the other medians, of a bone with these pores. The
+    /// longitudinal Young modulus is chosen only if there is no other, because up to two of its values give
+    /// the same velocity.
     pub(super) fn choose(priors: &[ParameterPrior], pores: &Pores, at: &Point) -> Self {
         let gradient =
             pores.bulk_velocity(at).map_or([1.0; PARAMETERS], |velocity| velocity.gradient);

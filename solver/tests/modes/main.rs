@@ -1,4 +1,4 @@
-//! Guided waves of plates and stacks: in a vacuum, and between fluids.
+//! Guided waves of plates and stacks: the fundamental ones and all others in a vacuum, and those between fluids.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 #![expect(clippy::disallowed_methods, reason = "independent formulas")]
@@ -6,6 +6,8 @@
 mod finite_elements;
 mod fluids;
 mod free;
+mod fundamental;
+mod rayleigh_lamb;
 
 use osteon_common::bone::{Bone, Sublayer, Sublayers};
 use osteon_common::case::Setup;
@@ -33,10 +35,14 @@ fn isotropic(young: f64, poisson: f64) -> Bone {
 
 const OPTIMUM: [f64; 6] = [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495];
 
-fn draw(dispersion: f64, index: u64) -> Bone {
+fn random_bone(seed: u64, dispersion: f64, index: u64) -> Bone {
     let [a, b, c, d, e, f] = OPTIMUM;
     let point = Point::of_bone([a, b, c, d, e, f, dispersion]);
-    Ensemble::new(&point, 23).unwrap().bone(index).unwrap()
+    Ensemble::new(&point, seed).unwrap().bone(index).unwrap()
+}
+
+fn draw(dispersion: f64, index: u64) -> Bone {
+    random_bone(23, dispersion, index)
 }
 
 fn optimum() -> Bone {

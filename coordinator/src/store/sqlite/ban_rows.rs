@@ -91,7 +91,8 @@ pub(super) fn doubts(connection: &Connection) -> rusqlite::Result<Vec<Result<Dou
     connection.prepare(sql)?.query_map([], read)?.collect()
 }
 
-/// Deletes the end of a job and the summary of its search's path, whose digest is kept with the doubts about it.
+/// Deletes the end of a job and the summary of its search's path, whose digest is kept with
+/// the doubts about the result.
 pub(super) fn reopen(connection: &Connection, job: JobId) -> rusqlite::Result<()> {
     let sql = "SELECT digest FROM summary WHERE job = ?1";
     let digest: Option<String> = connection.query_row(sql, [job.0], |row| row.get(0)).optional()?;

@@ -39,10 +39,8 @@ fn setup() -> Setup {
 
 fn mesh() -> Mesh {
     let scope = Scope::until_direct_wave(&setup(), 4500.0);
-    {
-        let in_fluid = |fluid: &FluidSublayer| if fluid.density < 1000.0 { 0.8e-3 } else { 0.7e-3 };
-        Mesh::with_sizes(&setup(), &whole(), &scope, 6, in_fluid, |_| 0.9e-3)
-    }
+    let in_fluid = |fluid: &FluidSublayer| if fluid.density < 1000.0 { 0.8e-3 } else { 0.7e-3 };
+    Mesh::with_sizes(&setup(), &whole(), &scope, 6, in_fluid, |_| 0.9e-3)
 }
 
 fn wavenumbers() -> Lanes {

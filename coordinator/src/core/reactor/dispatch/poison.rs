@@ -9,10 +9,8 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use osteon_common::case::Case;
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
-use osteon_common::realization::Realization;
 use osteon_files::case_file;
 
 use super::{batches, schedule};
@@ -124,9 +122,8 @@ pub(crate) fn failure(state: &State, job: JobId, now: Duration) -> Option<RunFai
 fn case_file(specification: &JobSpecification, point: &Point, index: u64) -> String {
     let case = || {
         let ensemble = specification.ensemble(point).ok()?;
-        let Realization { own_setup, bone } =
-            ensemble.realization(index, &specification.setup).ok()?;
-        Some(Case { setup: own_setup.unwrap_or(specification.setup), bone })
+        let realization = ensemble.realization(index, &specification.setup).ok()?;
+        Some(realization.into_case(&specification.setup))
     };
     case().map_or_else(String::new, |case| case_file::to_toml(&case))
 }

@@ -82,7 +82,7 @@ pub(crate) fn take_answer(
             checks::take_tie_break(turn, batch, &assignment, solved, &name);
         }
         Some(Purpose::Proof) => {
-            learn_pace(turn.state, &assignment, worker, elapsed_s);
+            learn_realization_time(turn.state, &assignment, worker, elapsed_s);
             checks::take_proof(turn, (worker, batch), &assignment, solved, &name);
             take_early(turn, worker);
         }
@@ -158,7 +158,12 @@ fn implausible(
 }
 
 /// Learns from a proof how long realizations of its job take.
-fn learn_pace(state: &mut State, assignment: &Assignment, worker: WorkerId, elapsed_s: f64) {
+fn learn_realization_time(
+    state: &mut State,
+    assignment: &Assignment,
+    worker: WorkerId,
+    elapsed_s: f64,
+) {
     let slots = state.workers.get(&worker).map(|attached| attached.hello.slots);
     if let Some((job, slots)) = state.jobs.get_mut(&assignment.job).zip(slots)
         && elapsed_s.is_finite()
@@ -198,8 +203,8 @@ fn fill(
     state.changed.insert(assignment.job);
 }
 
-/// Updates the rate of a worker, the time of a realization of its job and the delay of answers with one that arrives `now`;
-/// `before` is the time of the worker's answer before it.
+/// Updates the rate of a worker, the time of a realization of its job and the delay of answers with an answer
+/// that arrives `now`; `before` is the time of the worker's answer before it.
 fn measure(state: &mut State, batch: &Batch, elapsed_s: f64, (before, now): (Duration, Duration)) {
     let plausible = elapsed_s.is_finite() && elapsed_s >= ELAPSED_MIN_S;
     let waited_s = now.saturating_sub(batch.sent).as_secs_f64().max(ELAPSED_MIN_S);

@@ -1,19 +1,17 @@
 //! The fundamental guided waves against the Rayleigh-Lamb equations, the limits of thin plates, and two
 //! dense systems: polynomials across the plate, and eigenvectors of the first-order system.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
-#![expect(clippy::disallowed_methods, reason = "an independent formula")]
-
 use std::f64::consts::TAU;
 
 use faer::prelude::Solve as _;
 use faer::{Mat, Side, c64};
 use osteon_common::attenuation::Attenuation;
 use osteon_common::case::{Bone, Setup};
-use osteon_common::elasticity::{Elasticity, EngineeringConstants};
-use osteon_common::parameters::Point;
-use osteon_common::realization::Ensemble;
+use osteon_common::elasticity::Elasticity;
 use osteon_solver::{GuidedWave, GuidedWaves, Isa, Solver};
+
+use super::rayleigh_lamb::rayleigh_lamb;
+use super::{isotropic, optimum, random_bone};
 
 fn setup(thickness: f64, frequency: f64) -> Setup {
     let mut setup = Setup::default();
@@ -30,55 +28,9 @@ fn both(waves: &GuidedWaves) -> [GuidedWave; 2] {
     [waves.a0.unwrap(), waves.s0.unwrap()]
 }
 
-fn isotropic(young: f64, poisson: f64) -> Bone {
-    let constants = EngineeringConstants {
-        longitudinal_young_modulus: young,
-        longitudinal_poisson_ratio: poisson,
-        longitudinal_shear_modulus: young / (2.0 * (1.0 + poisson)),
-        transverse_young_modulus: young,
-        transverse_poisson_ratio: poisson,
-    };
-    Bone { density: 1700.0, elasticity: constants.elasticity().unwrap() }
-}
-
-const OPTIMUM: [f64; 6] = [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495];
-
+/// A random bone of the seed of these tests.
 fn draw(dispersion: f64, index: u64) -> Bone {
-    let [a, b, c, d, e, f] = OPTIMUM;
-    let point = Point::of_bone([a, b, c, d, e, f, dispersion]);
-    Ensemble::new(&point, 17).unwrap().bone(index).unwrap()
-}
-
-fn optimum() -> Bone {
-    let [density, e_l, nu_l, g_l, e_t, nu_t] = OPTIMUM;
-    let constants = EngineeringConstants {
-        longitudinal_young_modulus: e_l,
-        longitudinal_poisson_ratio: nu_l,
-        longitudinal_shear_modulus: g_l,
-        transverse_young_modulus: e_t,
-        transverse_poisson_ratio: nu_t,
-    };
-    Bone { density, elasticity: constants.elasticity().unwrap() }
-}
-
-/// The Rayleigh-Lamb function of a plate from -1 to 1, for waves of ratio `slow` to the longitudinal
-/// velocity and with the velocity of shear waves 1: zero for a symmetric or an antisymmetric wave.
-fn rayleigh_lamb(slow: f64, symmetric: bool, k: f64, omega: f64) -> f64 {
-    let squares = [(omega * slow).powi(2) - k * k, omega * omega - k * k];
-    // cos p, sin(p)/p and p sin(p) are even in p, and so real.
-    let [(cos_p, sin_p, up_p), (cos_q, sin_q, up_q)] = squares.map(|square: f64| {
-        let root = square.abs().sqrt();
-        let (cos, sin) = match square > 0.0 {
-            true => (root.cos(), root.sin() / root),
-            false => (root.cosh(), root.sinh() / root),
-        };
-        (cos, sin, square * sin)
-    });
-    let factor = (k * k - squares[1]).powi(2);
-    match symmetric {
-        true => factor.mul_add(cos_p * sin_q, 4.0 * k * k * up_p * cos_q),
-        false => factor.mul_add(sin_p * cos_q, 4.0 * k * k * up_q * cos_p),
-    }
+    random_bone(17, dispersion, index)
 }
 
 /// Phase and group velocity of a root that is followed from low frequencies, where it is `start`.
