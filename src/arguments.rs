@@ -27,7 +27,7 @@ pub(crate) use jobs::{
     ExplainArguments, FetchArguments, JobArguments, JobCommand, JobListArguments, PruneArguments,
     SubmitArguments, WatchArguments,
 };
-pub(crate) use modes::{FrequencyBand, ModesArguments};
+pub(crate) use modes::ModesArguments;
 pub(crate) use noun::Noun;
 pub(crate) use operators::{
     BackupArguments, CoordinatorCommand, DrainArguments, HealthArguments, UnbanArguments,

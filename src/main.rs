@@ -7,14 +7,12 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
-mod certificates;
 mod commands;
 mod cost;
 mod doctor;
 mod exit_status;
 #[cfg(test)]
 mod fuzz;
-mod job_point;
 mod listener_security;
 mod log_filter;
 mod logging;

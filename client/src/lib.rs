@@ -31,6 +31,7 @@ pub mod error;
 pub mod fetched;
 #[cfg(test)]
 mod fuzz;
+pub mod job_point;
 pub mod listener;
 pub mod operators;
 pub mod other_version;

@@ -294,7 +294,7 @@ fn is_at(file: &File, path: &Path) -> bool {
 ///
 /// # Errors
 /// If there is none, or if it cannot be read.
-pub fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpecification> {
+pub(crate) fn job_of(directory: &Path, kind: JobKind) -> anyhow::Result<JobSpecification> {
     Ok(job_file::read(&directory.join(JOB), kind)?)
 }
 
@@ -322,7 +322,7 @@ fn check_same_job(
 }
 
 /// Describes the first line in which the complete texts of two jobs differ.
-pub fn difference(there: &str, here: &str) -> Option<String> {
+pub(crate) fn difference(there: &str, here: &str) -> Option<String> {
     if there == here {
         return None;
     }
@@ -339,14 +339,14 @@ pub fn difference(there: &str, here: &str) -> Option<String> {
 ///
 /// # Errors
 /// If there is none, or if it cannot be read.
-pub fn result_of(directory: &Path) -> anyhow::Result<ResultFile> {
+pub(crate) fn result_of(directory: &Path) -> anyhow::Result<ResultFile> {
     let text = read_if_there(&directory.join(RESULT))?;
     let cannot = || format!("cannot read {}: no such file", result_path(directory));
     read_result(directory, &text.with_context(cannot)?)
 }
 
 /// Returns the path of the result in `directory`, for messages.
-pub fn result_path(directory: &Path) -> String {
+pub(crate) fn result_path(directory: &Path) -> String {
     visible::path(&directory.join(RESULT))
 }
 

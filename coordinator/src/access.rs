@@ -7,6 +7,7 @@ pub(crate) mod message_body;
 pub mod tls;
 pub mod tokens;
 
+use osteon_transport::certificates::WORKER_NAME;
 use osteon_transport::token::Token;
 use thiserror::Error;
 
@@ -15,11 +16,6 @@ use crate::access::tokens::{Role, Tokens};
 /// Name of the token's holder, stored in the extensions of a call.
 #[derive(Debug, Clone)]
 pub(crate) struct HolderName(pub(crate) String);
-
-/// The name that marks a worker's certificate (a URI among its subject alternative names).
-pub const WORKER_NAME: &str = "urn:osteon:worker";
-/// The name that marks a client's certificate (a URI among its subject alternative names).
-pub const CLIENT_NAME: &str = "urn:osteon:client";
 
 /// Callers that a listener admits.
 #[derive(Debug, Clone, PartialEq, Eq)]

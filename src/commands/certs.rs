@@ -4,13 +4,13 @@ use std::path::Path;
 
 use anyhow::{Context as _, anyhow};
 use osteon_common::visible;
+use osteon_transport::certificates::{Authority, CertificateHolder, PemPair};
 use osteon_transport::credential_file;
 use osteon_transport::endpoint;
 use time::OffsetDateTime;
 use zeroize::Zeroizing;
 
 use crate::arguments::CertsArguments;
-use crate::certificates::{Authority, CertificateHolder, PemPair};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::new_files::{self, NewFile};
 use crate::output;

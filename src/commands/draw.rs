@@ -1,12 +1,12 @@
 //! `draw`: one realization of a job as a complete case file.
 
 use anyhow::anyhow;
+use osteon_client::job_point;
 use osteon_common::job::JobKind;
 use osteon_files::{case_file, job_file};
 
-use crate::arguments::DrawArguments;
+use crate::arguments::{DrawArguments, PlaceArguments};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
-use crate::job_point;
 use crate::output;
 use crate::prepared_command::Ended;
 use crate::resolved::OutputFormat;
@@ -24,7 +24,9 @@ pub(super) fn draw(arguments: &DrawArguments) -> Ended {
             count - 1
         )));
     }
-    let point = job_point::chosen(&arguments.place, &input, &specification)?;
+    let PlaceArguments { at, group } = &arguments.place;
+    let point = job_point::chosen(at.as_deref(), group.as_deref(), &input, &specification)
+        .map_err(CommandFailure::BadInput)?;
     let ensemble = specification.ensemble(&point).map_err(CommandFailure::bad_input)?;
     let drawn = ensemble.realization(index, &specification.setup).map_err(|error| {
         CommandFailure::failed(anyhow::Error::new(error).context(format!(

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use osteon_common::warnings::case_warnings;
 use osteon_files::case_file;
+use osteon_local::frequency_band::FrequencyBand;
 use osteon_local::modes::{BandModes, BandModesError, BoneSurroundings};
 use osteon_solver::{Isa, ModesError};
 
-use crate::arguments::{FrequencyBand, ModesArguments};
+use crate::arguments::ModesArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::new_files::{self, NewFile};
 use crate::output::{self, ShownModes};

@@ -1,18 +1,18 @@
 //! `observe`: all observables of a job's realizations.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use osteon_client::job_point;
 use osteon_common::job::JobKind;
 use osteon_files::job_file;
+use osteon_local::observations::{ObservationError, Observations};
 use osteon_solver::Isa;
 
-use crate::arguments::ObserveArguments;
+use crate::arguments::{ObserveArguments, PlaceArguments};
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
-use crate::job_point;
 use crate::new_files::{self, NewFile};
 use crate::output::{self, ShownObservations};
 use crate::prepared_command::Ended;
 use crate::resolved;
-use osteon_local::observations::{ObservationError, Observations};
 
 /// Progress on a terminal.
 const BAR: &str = "{bar:30} {pos} of {len} realizations, {eta} left";
@@ -25,7 +25,9 @@ pub(super) async fn observe(arguments: ObserveArguments, isa: Isa, cores: u32) -
     let noted =
         job_file::of_input(&input, JobKind::Propagation).map_err(CommandFailure::bad_input)?;
     let specification = noted.specification;
-    let point = job_point::chosen(&place, &input, &specification)?;
+    let PlaceArguments { at, group } = &place;
+    let point = job_point::chosen(at.as_deref(), group.as_deref(), &input, &specification)
+        .map_err(CommandFailure::BadInput)?;
     if let Some(out) = &out {
         new_files::refuse_existing(out)?;
     }

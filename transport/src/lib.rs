@@ -3,6 +3,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod certificates;
 pub mod connection;
 pub mod credential_file;
 pub mod credentials;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use osteon_transport::certificates::WORKER_NAME;
 use osteon_transport::credential_file::{self, CredentialError};
 use osteon_transport::credentials::{self, ALPN};
 use osteon_transport::tls_failure::TlsFailure;
@@ -20,7 +21,7 @@ use tokio_rustls::rustls::{
 };
 use webpki::EndEntityCert;
 
-use crate::access::{Certificate, Fault, WORKER_NAME};
+use crate::access::{Certificate, Fault};
 
 /// The protocol of the live page.
 const PAGES_ALPN: &[u8] = b"http/1.1";

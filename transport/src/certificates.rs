@@ -1,7 +1,6 @@
-//! A certificate authority for one installation, and the certificates that it signs. This file
-//! reads and writes no files.
+//! A certificate authority for one installation, and the certificates that it signs. No file is read or
+//! written here.
 
-use osteon_coordinator::access::{CLIENT_NAME, WORKER_NAME};
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
     KeyUsagePurpose, SanType,
@@ -9,6 +8,10 @@ use rcgen::{
 use time::{Duration, OffsetDateTime};
 use zeroize::Zeroizing;
 
+/// The name that marks a worker's certificate (a URI among its subject alternative names).
+pub const WORKER_NAME: &str = "urn:osteon:worker";
+/// The name that marks a client's certificate (a URI among its subject alternative names).
+pub const CLIENT_NAME: &str = "urn:osteon:client";
 /// Validity of an authority in days.
 const AUTHORITY_DAYS: i64 = 3650;
 /// Certificates are valid from this long before their creation, because clocks differ.
@@ -17,19 +20,19 @@ const CLOCK_MARGIN: Duration = Duration::hours(1);
 const LOCAL_HOSTS: [&str; 3] = ["localhost", "127.0.0.1", "::1"];
 
 /// A certificate and its key, both in PEM.
-pub(crate) struct PemPair {
+pub struct PemPair {
     /// The certificate.
-    pub(crate) certificate: String,
+    pub certificate: String,
     /// Its private key, which is secret.
-    pub(crate) key: Zeroizing<String>,
+    pub key: Zeroizing<String>,
 }
 
 /// An authority that can sign.
-pub(crate) struct Authority(Issuer<'static, KeyPair>);
+pub struct Authority(Issuer<'static, KeyPair>);
 
 /// The holder of a certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum CertificateHolder<'a> {
+pub enum CertificateHolder<'a> {
     /// A coordinator, with the hosts under which it can be reached, besides the local machine's own
     /// names.
     Coordinator(&'a [String]),
@@ -40,8 +43,11 @@ pub(crate) enum CertificateHolder<'a> {
 }
 
 impl Authority {
-    /// Creates an authority that is valid from `now` on.
-    pub(crate) fn new(now: OffsetDateTime) -> Result<(Self, PemPair), rcgen::Error> {
+    /// Creates an authority that is valid from `now` on, and returns its certificate and key with it.
+    ///
+    /// # Errors
+    /// If no key can be made.
+    pub fn new(now: OffsetDateTime) -> Result<(Self, PemPair), rcgen::Error> {
         let key = KeyPair::generate()?;
         let mut params = CertificateParams::default();
         params.distinguished_name = named(&format!("osteon authority of {}", now.date()));
@@ -54,13 +60,19 @@ impl Authority {
         Ok((Self(Issuer::new(params, key)), made))
     }
 
-    /// Loads an existing authority.
-    pub(crate) fn from_pem(certificate: &str, key: &str) -> Result<Self, rcgen::Error> {
+    /// Loads an existing authority from its certificate and key, both in PEM.
+    ///
+    /// # Errors
+    /// If either is not what it should be.
+    pub fn from_pem(certificate: &str, key: &str) -> Result<Self, rcgen::Error> {
         Ok(Self(Issuer::from_ca_cert_pem(certificate, KeyPair::from_pem(key)?)?))
     }
 
     /// Issues a certificate for `bearer` that is valid for `days` from `now` on.
-    pub(crate) fn sign(
+    ///
+    /// # Errors
+    /// If a host is no name that a certificate can hold.
+    pub fn sign(
         &self,
         bearer: CertificateHolder<'_>,
         now: OffsetDateTime,

@@ -3,35 +3,34 @@
 use std::path::Path;
 
 use anyhow::{Context as _, anyhow};
-use osteon_client::results_directory;
 use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::parameters::Point;
 use osteon_files::input_file::InputFile;
 use osteon_files::{job_file, report};
 
-use crate::arguments::PlaceArguments;
-use crate::exit_status::CommandFailure;
+use crate::results_directory;
 
-/// Returns the best point of the given results, or else the fixed and start values of the job in the
-/// file `job`.
+/// Returns the best point of the results in `directory`, or of one of their groups, or else the fixed and
+/// start values of the job in the file `job`.
 ///
 /// # Errors
 /// If the results are not those of the job, or have no such point.
-pub(crate) fn chosen(
-    place: &PlaceArguments,
+pub fn chosen(
+    directory: Option<&Path>,
+    group: Option<&str>,
     job: &InputFile,
     specification: &JobSpecification,
-) -> Result<Point, CommandFailure> {
-    let Some(directory) = &place.at else { return Ok(specification.start()) };
-    let point = best_point(directory, place.group.as_deref()).map_err(CommandFailure::BadInput)?;
-    same_job(directory, job, specification).map_err(CommandFailure::BadInput)?;
+) -> anyhow::Result<Point> {
+    let Some(directory) = directory else { return Ok(specification.start()) };
+    let point = best_point(directory, group)?;
+    check_same_job(directory, job, specification)?;
     Ok(point)
 }
 
 /// Refuses a directory whose results are not those of the job, since the realizations at its best
 /// point would be different. If one of the two has no data, as the job of a propagation, everything
 /// else is compared, which is what realizations depend on.
-fn same_job(
+fn check_same_job(
     directory: &Path,
     job: &InputFile,
     specification: &JobSpecification,
