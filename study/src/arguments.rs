@@ -47,6 +47,13 @@ pub(crate) enum Study {
     /// Count them for bones that differ in thickness, attenuation, coupling and tilt, with a model that
     /// knows the laws of these differences and with one that does not
     Populations(TwinsArguments),
+    /// Count how many confidence intervals of porosity and dispersion contain the true value, from 20, 100
+    /// and 2747 velocities
+    Porosities(TwinsArguments),
+    /// Count them for posteriors of a porosity that changes through the thickness, both ends free
+    PorosityProfiles(TwinsArguments),
+    /// Identify one porosity from bones whose porosity changes through the thickness
+    UnmodelledProfiles(TwinsArguments),
     /// Count how many intervals of posteriors contain the true value, over parameter sets drawn from
     /// the prior with all seven parameters free
     Posteriors(PosteriorsArguments),

@@ -18,6 +18,7 @@ mod generator;
 mod identify;
 pub mod methods;
 pub mod models;
+pub mod porosities;
 pub mod posteriors;
 pub mod refinement;
 pub mod searches;

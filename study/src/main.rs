@@ -18,7 +18,7 @@ use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, digest,
-    failures, methods, models, refinement, searches, setups, variance,
+    failures, methods, models, porosities, refinement, searches, setups, variance,
 };
 
 use crate::arguments::{
@@ -63,6 +63,28 @@ const POSTERIOR_REFERENCE: OverDraws = OverDraws {
     table: reference::table,
 };
 
+/// A study of identifications from simulated data.
+struct OverTwins {
+    name: &'static str,
+    repetitions: u64,
+    table: fn(&Twins, RowCallback<'_>) -> Result<MarkdownTable, StudyError>,
+}
+
+const TWINS: OverTwins = OverTwins { name: "twins", repetitions: twins::SETS, table: twins::table };
+const COVERAGE: OverTwins =
+    OverTwins { name: "coverage", repetitions: twins::REPETITIONS, table: twins::coverage };
+const POPULATIONS: OverTwins =
+    OverTwins { name: "populations", repetitions: twins::REPETITIONS, table: twins::populations };
+const POROSITIES: OverTwins =
+    OverTwins { name: "porosities", repetitions: porosities::BONES, table: porosities::coverage };
+const POROSITY_PROFILES: OverTwins = OverTwins {
+    name: "porosity-profiles",
+    repetitions: porosities::PROFILES,
+    table: porosities::profiles,
+};
+const UNMODELLED_PROFILES: OverTwins =
+    OverTwins { name: "unmodelled-profiles", repetitions: 1, table: porosities::unmodelled };
+
 fn main() -> ExitCode {
     let Arguments { study } = Arguments::parse();
     let isa = match Isa::chosen(std::env::var_os(Isa::VARIABLE)) {
@@ -104,14 +126,13 @@ fn run_study(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::Searches(arguments) => run_over_draws(&SEARCHES, arguments, isa),
         Study::Continuity(arguments) => run_over_draws(&CONTINUITY, arguments, isa),
         Study::Variance(arguments) => run_over_seeds(arguments, isa),
-        Study::Twins(arguments) => {
-            run_over_twins("twins", twins::SETS, twins::table, arguments, isa)
-        }
-        Study::Coverage(arguments) => {
-            run_over_twins("coverage", twins::REPETITIONS, twins::coverage, arguments, isa)
-        }
-        Study::Populations(arguments) => {
-            run_over_twins("populations", twins::REPETITIONS, twins::populations, arguments, isa)
+        Study::Twins(arguments) => run_over_twins(&TWINS, arguments, isa),
+        Study::Coverage(arguments) => run_over_twins(&COVERAGE, arguments, isa),
+        Study::Populations(arguments) => run_over_twins(&POPULATIONS, arguments, isa),
+        Study::Porosities(arguments) => run_over_twins(&POROSITIES, arguments, isa),
+        Study::PorosityProfiles(arguments) => run_over_twins(&POROSITY_PROFILES, arguments, isa),
+        Study::UnmodelledProfiles(arguments) => {
+            run_over_twins(&UNMODELLED_PROFILES, arguments, isa)
         }
         Study::Posteriors(arguments) => run_over_posteriors(arguments, isa),
         Study::PosteriorReference(arguments) => {
@@ -140,16 +161,14 @@ fn run_over_seeds(arguments: RepetitionsArguments, isa: Isa) -> Result<String, S
 }
 
 fn run_over_twins(
-    name: &str,
-    repetitions: u64,
-    table: fn(&Twins, RowCallback<'_>) -> Result<MarkdownTable, StudyError>,
+    study: &OverTwins,
     arguments: TwinsArguments,
     isa: Isa,
 ) -> Result<String, StudyError> {
-    let repetitions = arguments.repetitions.unwrap_or(repetitions);
+    let repetitions = arguments.repetitions.unwrap_or(study.repetitions);
     let seed = arguments.seed;
-    let table = table(&Twins { repetitions, seed, isa }, &say)?;
-    Ok(add_title(&format!("{name} --repetitions {repetitions} --seed {seed}"), &table))
+    let table = (study.table)(&Twins { repetitions, seed, isa }, &say)?;
+    Ok(add_title(&format!("{} --repetitions {repetitions} --seed {seed}", study.name), &table))
 }
 
 fn run_over_posteriors(arguments: PosteriorsArguments, isa: Isa) -> Result<String, StudyError> {
