@@ -35,7 +35,7 @@ fn observables_are_those_of_each_case() {
     let (propagated, observed) = (rows(&out.join("realizations.csv")), rows(&observed));
     assert_eq!(observed.len(), 6);
     for (index, (row, expected)) in observed.iter().zip(&propagated).enumerate() {
-        assert_eq!([&row[0], &row[1], &row[5]], [&expected[0], &expected[1], &expected[2]]);
+        assert_eq!([&row[0], &row[1], &row[7]], [&expected[0], &expected[1], &expected[2]]);
         let drawn = run(&["draw", text(&file), "--index", &index.to_string()]);
         let case = scratch.write(&format!("case-{index}.toml"), drawn.succeeded());
         let simulated = run(&["simulate", text(&case), "--json"]).json();
@@ -44,6 +44,11 @@ fn observables_are_those_of_each_case() {
             let found: f64 = row[column].parse().unwrap();
             // A drawn case is written with all digits, so that nothing is lost.
             assert_eq!(found.to_bits(), signal[key].as_f64().unwrap().to_bits(), "{key}");
+        }
+        for (column, wave) in [(5, "a0"), (6, "s0")] {
+            let found: f64 = row[column].parse().unwrap();
+            let expected = simulated["guided_waves"][wave]["phase_velocity"].as_f64().unwrap();
+            assert_eq!(found.to_bits(), expected.to_bits(), "{wave}");
         }
     }
 }
@@ -73,7 +78,7 @@ fn realizations_without_velocity_are_counted() {
     let summary: Value = serde_json::from_str(&observed.stdout).unwrap();
     assert_eq!(summary["failures"]["direct_wave_first"], 5);
     assert!(summary["velocity"]["mean"].is_null());
-    assert!(rows(&csv).iter().all(|row| row[1..] == ["", "", "", "", "direct_wave_first"]));
+    assert!(rows(&csv).iter().all(|row| row[1..] == ["", "", "", "", "", "", "direct_wave_first"]));
 }
 
 #[test]

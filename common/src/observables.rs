@@ -17,10 +17,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::accepted::Interval;
 
 /// Number of the observables.
-pub const OBSERVABLES: usize = 3;
+pub const OBSERVABLES: usize = 5;
 
-/// An observable of the first signal besides its velocity (docs/physics.md, "What else the first signal
-/// tells"). The order of the variants is that of all lists, and of the digest.
+/// An observable besides the velocity of the first signal (docs/physics.md, "What else the first signal
+/// tells" and "Guided waves of the bone"). The order of the variants is that of all lists, and of the digest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Observable {
     /// Velocity of the extremum that the picking does not choose, m/s.
@@ -29,6 +29,10 @@ pub enum Observable {
     Decay,
     /// Frequency by the times of both extrema, Hz.
     CenterFrequency,
+    /// Phase velocity of the guided wave A0 at the probe's frequency of guided waves, m/s.
+    A0Velocity,
+    /// Phase velocity of the guided wave S0 there, m/s.
+    S0Velocity,
 }
 
 /// A row of the table: everything about an observable that is not computed.
@@ -93,11 +97,41 @@ const ROWS: [ObservableRow; OBSERVABLES] = [
                     10⁸), in every row; as for `decay`",
         of_list: "with a list of velocities: the centre frequency of each, Hz",
     },
+    ObservableRow {
+        name: "a0_velocity",
+        plural: "a0_velocities",
+        title: "phase velocity of A0",
+        short: "A0",
+        unit: "m/s",
+        accepted: Interval::from_to(10.0, 1e5, "m/s"),
+        above_zero: "it is a velocity",
+        of_column: "name of the CSV column that holds the phase velocity (m/s, 10 to 10⁵) of the guided wave \
+                    A0 at `probe.guided_wave_frequency`, in every row; as for `decay`",
+        of_list: "with a list of velocities: the phase velocity of A0 with each, m/s",
+    },
+    ObservableRow {
+        name: "s0_velocity",
+        plural: "s0_velocities",
+        title: "phase velocity of S0",
+        short: "S0",
+        unit: "m/s",
+        accepted: Interval::from_to(10.0, 1e5, "m/s"),
+        above_zero: "it is a velocity",
+        of_column: "name of the CSV column that holds the phase velocity (m/s, 10 to 10⁵) of the guided wave \
+                    S0 at `probe.guided_wave_frequency`, in every row; as for `decay`",
+        of_list: "with a list of velocities: the phase velocity of S0 with each, m/s",
+    },
 ];
 
 impl Observable {
     /// All observables, in their order.
-    pub const ALL: [Self; OBSERVABLES] = [Self::OtherVelocity, Self::Decay, Self::CenterFrequency];
+    pub const ALL: [Self; OBSERVABLES] = [
+        Self::OtherVelocity,
+        Self::Decay,
+        Self::CenterFrequency,
+        Self::A0Velocity,
+        Self::S0Velocity,
+    ];
 
     /// Returns the row of the table.
     pub const fn row(self) -> &'static ObservableRow {

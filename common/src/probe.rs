@@ -61,6 +61,9 @@ pub struct Probe {
     pub amplitude: f64,
     /// Form of the pulse.
     pub pulse: PulseForm,
+    /// Frequency, Hz, at which guided waves are measured; `None`: the centre frequency. It changes nothing
+    /// else.
+    pub guided_wave_frequency: Option<f64>,
     /// Width along the probe, m, of the source's and of each receiver's element: the source emits evenly
     /// over it, and a receiver averages over it. 0: lines. Below the pitch and the nearest distance.
     pub element_width: f64,
@@ -115,6 +118,11 @@ impl Probe {
         self.center_frequency * self.pulse.bandwidth()
     }
 
+    /// Returns the frequency, Hz, at which A0 and S0 are computed.
+    pub fn frequency_of_guided_waves(&self) -> f64 {
+        self.guided_wave_frequency.unwrap_or(self.center_frequency)
+    }
+
     /// Returns the height of the lowest receiver, m.
     pub fn lowest_receiver(&self) -> f64 {
         self.places().map(|place| place.x3).fold(f64::INFINITY, f64::min)
@@ -140,6 +148,7 @@ impl Default for Probe {
             center_frequency: 1e6,
             amplitude: 100.0,
             pulse: PulseForm::default(),
+            guided_wave_frequency: None,
             element_width: 0.0,
             source: Source { x1: 0.0, x3: 2e-3 },
             receivers: Receivers { first_x1: 11e-3, pitch: 0.8e-3, count: 14, x3: 2e-3 },
@@ -164,6 +173,13 @@ impl Section for Probe {
         fields.table(Key { name: "pulse", meaning: "form of the pulse" }, &mut |fields| {
             self.pulse.declare(fields);
         });
+        let guided = "frequency at which the guided waves A0 and S0 are computed; by default \
+                      `center_frequency`";
+        fields.optional_number(
+            Key { name: "guided_wave_frequency", meaning: guided },
+            &mut self.guided_wave_frequency,
+            Number::above_zero(&FREQUENCY),
+        );
         let width = "width of the source and of each receiver along the probe, over which they emit and \
                      average; below the pitch and the nearest distance. 0: lines";
         fields.number(

@@ -85,6 +85,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                     center_frequency: pulse.0,
                     amplitude: pulse.1,
                     pulse: pulse.2,
+                    guided_wave_frequency: bidirectional.then_some(0.2 * pulse.0),
                     element_width,
                     source: Source { x1, x3 },
                     receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },
@@ -355,13 +356,14 @@ fn change_prior(job: &mut JobSpecification, prior: PosteriorPrior) {
     job.posterior.get_or_insert_default().priors[6] = prior;
 }
 
-const EDITS: [Edit; 22] = [
+const EDITS: [Edit; 23] = [
     |job, x| job.setup.layers.coupling = Fluid { thickness: x, ..Layers::default().coupling },
     |job, x| job.setup.layers.bone_thickness = x,
     |job, x| job.setup.layers.marrow = Fluid { sound_speed: x, ..Layers::default().marrow },
     |job, x| job.setup.probe.center_frequency = x,
     |job, x| job.setup.probe.pulse = tone(x),
     |job, x| job.setup.probe.element_width = x,
+    |job, x| job.setup.probe.guided_wave_frequency = Some(x),
     |job, x| job.setup.probe.source.x1 = x,
     |job, x| job.setup.probe.source.x3 = x,
     |job, x| job.setup.probe.receivers.first_x1 = x,

@@ -6,6 +6,7 @@ mod summary;
 use std::fmt::Write as _;
 
 use osteon_common::job::JobSpecification;
+use osteon_common::observables::Observable;
 use osteon_common::parameters::Point;
 use osteon_common::realization::PointError;
 use osteon_common::settings::Extremum;
@@ -58,7 +59,7 @@ impl Observations {
             let observed = solver.observed_realization(&ensemble, index, workspace);
             done();
             match observed {
-                Ok(observed) => Observation::from(&observed),
+                Ok(observed) => Observation::from(observed),
                 Err(kind) => Observation::failed(kind),
             }
         };
@@ -69,13 +70,15 @@ impl Observations {
 
     /// Returns one row for each realization, with a heading.
     pub fn to_csv(&self) -> String {
-        let mut text = "index,velocity,other_velocity,decay,center_frequency,failure\n".to_owned();
+        let names = Observable::ALL.map(Observable::name).join(",");
+        let mut text = format!("index,velocity,{names},failure\n");
         for (index, row) in self.rows.iter().enumerate() {
             let cell = |value: Option<f64>| value.map_or_else(String::new, |v| format!("{v:?}"));
-            let [velocity, other, decay, frequency] = row.values().map(cell);
+            let velocity = cell(row.outcome.ok());
+            let observables = row.observables.map(cell).0.join(",");
             let failure = row.outcome.err().map_or("", |kind| kind.name());
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "{index},{velocity},{other},{decay},{frequency},{failure}");
+            let _ = writeln!(text, "{index},{velocity},{observables},{failure}");
         }
         text
     }

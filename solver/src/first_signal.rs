@@ -1,15 +1,17 @@
-//! Observables of the first signal besides its velocity: other extremum, decay, frequency.
+//! Observables besides the velocity of the first signal: its other extremum, decay and frequency, and the
+//! phase velocities of guided waves.
 
 use std::f64::consts::LN_10;
 
-use osteon_common::bone::BoneRef;
+use osteon_common::bone::{BoneRef, CaseBone};
 use osteon_common::case::Setup;
-use osteon_common::observables::{Observable, ObservableSet, PerObservable};
+use osteon_common::observables::{Observable, ObservableMeans, ObservableSet, PerObservable};
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::{Ensemble, Realization};
 use osteon_common::settings::{Extremum, Picking};
 
 use crate::arrival::Arrival;
+use crate::exact::guided::GuidedWave;
 use crate::failure::Failure;
 use crate::picking::{mean, slope};
 use crate::solver::{Solver, Workspace};
@@ -34,19 +36,19 @@ pub struct FirstSignal {
     pub center_frequency: Option<f64>,
 }
 
-/// One realization with a velocity, and what else its first signal tells.
-#[derive(Debug, Clone, PartialEq)]
+/// One realization with a velocity, and all other observables.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObservedRealization {
     /// Velocity, m/s: that of [`Solver::realization`], to the bit.
     pub velocity: f64,
-    /// The other observables.
-    pub signal: FirstSignal,
+    /// The other observables, where there are any.
+    pub observables: ObservableMeans,
 }
 
 impl Solver {
     /// Computes a realization as [`Solver::realization`] does, and these observables of it. The decay takes
-    /// no further pass, the others a second one. A realization that lacks one of them is a failure: of the
-    /// kind of the other extremum's, or `not_finite`.
+    /// no further pass, other velocity and centre frequency take a second one. A realization that lacks one of
+    /// them is a failure: of the kind of the other extremum's, or `not_finite`.
     pub fn realization_with(
         &self,
         observables: ObservableSet,
@@ -54,45 +56,27 @@ impl Solver {
         index: u64,
         workspace: &mut Workspace,
     ) -> RealizationResult {
-        match self.with_observables(observables, ensemble, index, workspace) {
+        let solved = self.drawn(ensemble, index).and_then(|(own, bone)| {
+            let solver = own.as_ref().unwrap_or(self);
+            let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
+            let (found, other_failure) =
+                solver.observables(observables, (&bone).into(), &arrival, workspace);
+            if let Some(kind) = other_failure {
+                return Err(kind);
+            }
+            let value = |one| found[one].unwrap_or(f64::NAN);
+            Ok(RealizationResult {
+                observables: PerObservable::new(
+                    |one| if observables[one] { value(one) } else { 0.0 },
+                ),
+                ..RealizationResult::solved(arrival.velocity, arrival.estimated_error)
+            })
+        });
+        match solved {
             Ok(solved) if solved.invalid_observable().is_none() => solved,
             Ok(_) => RealizationResult::failed(FailureKind::NotFinite),
             Err(kind) => RealizationResult::failed(kind),
         }
-    }
-
-    fn with_observables(
-        &self,
-        observables: ObservableSet,
-        ensemble: &Ensemble,
-        index: u64,
-        workspace: &mut Workspace,
-    ) -> Result<RealizationResult, FailureKind> {
-        let realization = ensemble.realization(index, self.setup());
-        let Realization { own_setup, bone } = realization.map_err(|_| FailureKind::NotFinite)?;
-        let own = own_setup.map(|own| self.with_setup(&own));
-        let solver = own.as_ref().unwrap_or(self);
-        let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
-        let needs_other =
-            observables[Observable::OtherVelocity] || observables[Observable::CenterFrequency];
-        let other = match needs_other {
-            true => Some(
-                solver.other_arrival((&bone).into(), workspace).map_err(|failure| failure.kind)?,
-            ),
-            false => None,
-        };
-        let value = |observable| match (observable, &other) {
-            (Observable::Decay, _) => solver.decay(&arrival),
-            (Observable::OtherVelocity, Some(other)) => other.velocity,
-            (Observable::CenterFrequency, Some(other)) => {
-                frequency(&arrival, other).unwrap_or(f64::NAN)
-            }
-            (Observable::OtherVelocity | Observable::CenterFrequency, None) => 0.0,
-        };
-        Ok(RealizationResult {
-            observables: PerObservable::new(|one| if observables[one] { value(one) } else { 0.0 }),
-            ..RealizationResult::solved(arrival.velocity, arrival.estimated_error)
-        })
     }
 
     /// Computes all observables of realization `index` of an ensemble.
@@ -105,13 +89,49 @@ impl Solver {
         index: u64,
         workspace: &mut Workspace,
     ) -> Result<ObservedRealization, FailureKind> {
-        let realization = ensemble.realization(index, self.setup());
-        let Realization { own_setup, bone } = realization.map_err(|_| FailureKind::NotFinite)?;
-        let own = own_setup.map(|own| self.with_setup(&own));
+        let (own, bone) = self.drawn(ensemble, index)?;
         let solver = own.as_ref().unwrap_or(self);
         let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
-        let signal = solver.first_signal(&bone, &arrival, workspace);
-        Ok(ObservedRealization { velocity: arrival.velocity, signal })
+        let all = ObservableSet::new(|_| true);
+        let (observables, _) = solver.observables(all, (&bone).into(), &arrival, workspace);
+        Ok(ObservedRealization { velocity: arrival.velocity, observables })
+    }
+
+    /// Returns the bone at `index` of an ensemble, and the solver of its setup if it has its own.
+    fn drawn(
+        &self,
+        ensemble: &Ensemble,
+        index: u64,
+    ) -> Result<(Option<Self>, CaseBone), FailureKind> {
+        let realization = ensemble.realization(index, self.setup());
+        let Realization { own_setup, bone } = realization.map_err(|_| FailureKind::NotFinite)?;
+        Ok((own_setup.map(|own| self.with_setup(&own)), bone))
+    }
+
+    /// Computes those observables of a bone that are wanted, and returns why the other extremum was not
+    /// picked, if it was wanted.
+    fn observables(
+        &self,
+        wanted: ObservableSet,
+        bone: BoneRef<'_>,
+        arrival: &Arrival,
+        workspace: &mut Workspace,
+    ) -> (ObservableMeans, Option<FailureKind>) {
+        let needs_other = wanted[Observable::OtherVelocity] || wanted[Observable::CenterFrequency];
+        let other = needs_other.then(|| self.other_arrival(bone, workspace));
+        let picked = other.as_ref().and_then(|other| other.as_ref().ok());
+        let needs_waves = wanted[Observable::A0Velocity] || wanted[Observable::S0Velocity];
+        let waves = needs_waves.then(|| self.guided_waves(bone));
+        let phase_velocity = |wave: Option<GuidedWave>| Some(wave?.phase_velocity);
+        let value = |observable| match observable {
+            Observable::Decay => Some(self.decay(arrival)),
+            Observable::OtherVelocity => Some(picked?.velocity),
+            Observable::CenterFrequency => frequency(arrival, picked?),
+            Observable::A0Velocity => phase_velocity(waves?.a0),
+            Observable::S0Velocity => phase_velocity(waves?.s0),
+        };
+        let found = ObservableMeans::new(|one| if wanted[one] { value(one) } else { None });
+        (found, other.and_then(|other| other.err().map(|failure| failure.kind)))
     }
 
     /// Computes the other observables of the first signal of a bone, of which `arrival` is the arrival.

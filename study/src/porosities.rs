@@ -171,7 +171,7 @@ pub fn unmodelled(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTa
                 millimetres(thickness),
                 format!("{} → {}", ends[0], ends[1]),
                 shape.name().to_owned(),
-                format!("{mean}"),
+                format!("{mean:.2}"),
                 format!("{shift:+.0}"),
                 value(0),
                 value(1),

@@ -87,8 +87,8 @@ const KEYS_OF_GROUPS: [Key; 3] = [
         name: "known",
         meaning: "quantities of the setup that are known of each group: the names of the CSV columns that \
                   hold their values (SI units, the same in all rows of a group), for any of \
-                  `bone_thickness`, `bone_quality_factor`, `coupling_sound_speed`; requires `group`, see \
-                  [below](#groups-of-velocities)",
+                  `bone_thickness`, `bone_quality_factor`, `coupling_sound_speed`, `porosity`, \
+                  `surface_porosity`, `marrow_porosity`; requires `group`, see [below](#groups-of-velocities)",
     },
     Key {
         name: "groups",

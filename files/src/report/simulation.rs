@@ -95,7 +95,7 @@ pub struct FirstSignalReport {
 /// The fundamental guided waves of the bone as a plate in a vacuum, without its attenuation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GuidedWavesReport {
-    /// The centre frequency of the probe, at which they are computed, Hz.
+    /// The frequency at which they are computed, Hz: `probe.guided_wave_frequency`.
     pub frequency: f64,
     /// The wave that is flexural at low frequencies; null where it was not found.
     pub a0: Option<GuidedWaveReport>,

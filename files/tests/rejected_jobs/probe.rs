@@ -18,6 +18,8 @@ fn probe() {
             ("element_width = 0.5e-3", "element_width = -0.1e-3"),
             ("element_width = 0.5e-3", "element_width = 0.9e-3"),
             ("element_width = 0.5e-3", "element_width = 0.5"),
+            ("guided_wave_frequency = 0.2e6", "guided_wave_frequency = 0.0"),
+            ("guided_wave_frequency = 0.2e6", "guided_wave_frequency = 0.2"),
             ("tilt = 0.001", "tilt = 1.0"),
             ("tilt = 0.001", "tilt = -0.2"),
             ("bidirectional = true", "bidirectional = \"both\""),

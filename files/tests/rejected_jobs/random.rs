@@ -35,7 +35,7 @@ fn a_scatter_needs_a_mean() {
         edited(", attenuation = { quality_factor = 15.0, reference_frequency = 0.8e6 }", "");
     assert_eq!(
         refusal(&without, JobKind::Identification),
-        "1 error\n  line 59: random.bone_quality_factor: scatters about \
+        "1 error\n  line 60: random.bone_quality_factor: scatters about \
          layers.bone.attenuation.quality_factor, which is not given; give both"
     );
 }
@@ -47,7 +47,7 @@ fn a_log_normal_law_needs_a_mean_above_0() {
     let text = level.replace(&format!("{law}\"uniform\""), &format!("{law}\"log_normal\""));
     assert_eq!(
         refusal(&text, JobKind::Identification),
-        "1 error\n  line 68: random.probe_tilt.distribution: is \"log_normal\", which requires a mean \
+        "1 error\n  line 69: random.probe_tilt.distribution: is \"log_normal\", which requires a mean \
          above 0, and probe.tilt is 0.0: set it to \"normal\" or \"uniform\""
     );
 }

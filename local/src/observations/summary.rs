@@ -1,5 +1,6 @@
 //! Moments of each observable, and how each goes with the velocity.
 
+use osteon_common::observables::{Observable, PerObservable};
 use osteon_common::outcome::{FailureCounts, Outcome};
 use osteon_common::settings::Extremum;
 
@@ -14,8 +15,10 @@ pub struct ObservationSummary {
     pub realizations: u64,
     /// Realizations without a velocity.
     pub failures: FailureCounts,
-    /// Velocity (m/s), other velocity (m/s), decay (dB/cm) and centre frequency (Hz).
-    pub columns: [ObservableMoments; 4],
+    /// Velocity, m/s.
+    pub velocity: ObservableMoments,
+    /// The other observables, each in its unit.
+    pub observables: PerObservable<ObservableMoments>,
 }
 
 /// One observable over the realizations that have it.
@@ -35,11 +38,10 @@ pub struct ObservableMoments {
 impl ObservationSummary {
     pub(super) fn new(other_extremum: Extremum, rows: &[Observation]) -> Self {
         let outcomes: Vec<Outcome> = rows.iter().map(|row| row.outcome).collect();
-        let column = |which: usize| {
+        let column = |which: Option<Observable>| {
             let mut sums = Sums::default();
             for row in rows {
-                let values = row.values();
-                if let (Some(velocity), Some(value)) = (values[0], values[which]) {
+                if let (Some(velocity), Some(value)) = (row.value(None), row.value(which)) {
                     sums.add(velocity, value);
                 }
             }
@@ -49,13 +51,14 @@ impl ObservationSummary {
             other_extremum,
             realizations: rows.len() as u64,
             failures: FailureCounts::from_outcomes(&outcomes),
-            columns: std::array::from_fn(column),
+            velocity: column(None),
+            observables: PerObservable::new(|one| column(Some(one))),
         }
     }
 
     /// Returns whether any realization has a velocity.
     pub fn has_velocity(&self) -> bool {
-        self.columns[0].count > 0
+        self.velocity.count > 0
     }
 }
 

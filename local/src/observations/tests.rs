@@ -1,14 +1,13 @@
+use osteon_common::observables::PerObservable;
 use osteon_common::outcome::FailureKind;
 
 use super::*;
 
 fn observation(velocity: f64, other: Option<f64>, decay: f64) -> Observation {
-    Observation {
-        outcome: Ok(velocity),
-        other_velocity: other,
-        decay: Some(decay),
-        center_frequency: other.map(|_| 0.8e6),
-    }
+    let mut observables = PerObservable::only(Observable::Decay, decay);
+    observables[Observable::OtherVelocity] = other;
+    observables[Observable::CenterFrequency] = other.map(|_| 0.8e6);
+    Observation { outcome: Ok(velocity), observables }
 }
 
 fn observations() -> Observations {
@@ -25,11 +24,12 @@ fn observations() -> Observations {
 
 #[test]
 fn what_is_unknown_is_an_empty_field() {
-    let expected = "index,velocity,other_velocity,decay,center_frequency,failure\n\
-                    0,3900.0,3700.0,5.0,800000.0,\n\
-                    1,,,,,no_arrival\n\
-                    2,3950.0,,4.0,,\n\
-                    3,4000.0,3720.0,3.0,800000.0,\n";
+    let expected = "\
+        index,velocity,other_velocity,decay,center_frequency,a0_velocity,s0_velocity,failure\n\
+        0,3900.0,3700.0,5.0,800000.0,,,\n\
+        1,,,,,,,no_arrival\n\
+        2,3950.0,,4.0,,,,\n\
+        3,4000.0,3720.0,3.0,800000.0,,,\n";
     assert_eq!(observations().to_csv(), expected);
 }
 
@@ -50,7 +50,8 @@ fn every_observable_is_summarized_over_those_that_have_it() {
         // It does not vary.
         column(2, 0.8e6, 0.0, None),
     ];
-    for (found, expected) in summary.columns.iter().zip(expected) {
+    let found = [&summary.velocity].into_iter().chain(&summary.observables.0);
+    for (found, expected) in found.zip(expected) {
         assert_eq!((found.count, found.mean), (expected.count, expected.mean));
         let [found_sd, sd] = [found, &expected].map(|column| column.standard_deviation.unwrap());
         assert!((found_sd - sd).abs() <= 1e-12 * sd, "{found:?}");

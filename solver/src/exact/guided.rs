@@ -65,7 +65,7 @@ impl GuidedWaves {
 }
 
 impl Solver {
-    /// Computes the fundamental guided waves of a bone at the probe's centre frequency: those of a plate
+    /// Computes the fundamental guided waves of a bone at the probe's frequency of guided waves: those of a plate
     /// of the bone's thickness with free faces, without attenuation. Neither the fluids nor the solver's
     /// method and refinement matter.
     pub fn guided_waves<'a>(&self, bone: impl Into<BoneRef<'a>>) -> GuidedWaves {
@@ -73,7 +73,7 @@ impl Solver {
     }
 
     fn guided_waves_of(&self, bone: BoneRef<'_>) -> GuidedWaves {
-        let (isa, frequency) = (self.isa(), self.setup().probe.center_frequency);
+        let (isa, frequency) = (self.isa(), self.setup().probe.frequency_of_guided_waves());
         let thickness = self.setup().layers.bone_thickness;
         let media = Media::new(isa, bone, thickness);
         let symmetry = Symmetry::new(&bone.sublayers(thickness));

@@ -101,6 +101,28 @@ fn thick_and_thin_plates_have_the_velocities_of_a_face_and_of_a_membrane() {
     }
 }
 
+/// A thin plate has A0, S0 and SH0 alone, however low the frequency.
+#[test]
+fn thin_plates_have_three_waves() {
+    let (young, poisson, thickness) = (16e9, 0.25, 3e-3);
+    let bone = isotropic(young, poisson);
+    let shear = across(&bone)[0];
+    let membrane = (young / (1.0 - poisson * poisson) / bone.density).sqrt();
+    for step in 0..30 {
+        let scaled = 3e-4 * 1.2_f64.powi(step);
+        let found = modes(&bone, thickness, scaled * shear / thickness);
+        let velocity = |name: &str| {
+            let mode = found.iter().find(|mode| mode.name.as_deref() == Some(name)).unwrap();
+            mode.phase_velocity
+        };
+        assert_eq!(found.len(), 3, "{scaled}: {found:?}");
+        // What is neglected grows as the square of the thickness in wavelengths.
+        let limit = 1e-6 + 0.1 * scaled * scaled;
+        assert!((velocity("S0") / membrane - 1.0).abs() < limit, "{scaled}: {found:?}");
+        assert!((velocity("SH0") / shear - 1.0).abs() < 1e-6, "{scaled}: {found:?}");
+    }
+}
+
 /// A wave begins at its cut-off frequency, at which its wavelength is infinite.
 #[test]
 fn waves_begin_at_the_resonances_of_the_thickness() {

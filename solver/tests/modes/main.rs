@@ -7,6 +7,7 @@ mod finite_elements;
 mod fluids;
 mod free;
 mod fundamental;
+mod published;
 mod rayleigh_lamb;
 
 use osteon_common::bone::{Bone, Sublayer, Sublayers};

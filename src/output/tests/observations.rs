@@ -1,5 +1,6 @@
 //! Output of `observe`.
 
+use osteon_common::observables::PerObservable;
 use osteon_common::outcome::FailureCounts;
 use osteon_common::settings::Extremum;
 
@@ -31,12 +32,14 @@ fn observables_are_a_table() {
         other_extremum: Extremum::Second,
         realizations: 2747,
         failures,
-        columns: [
-            column(2743, 3907.69, 104.39, 1.0),
+        velocity: column(2743, 3907.69, 104.39, 1.0),
+        observables: PerObservable([
             column(2740, 3877.87, 99.96, 0.998),
             column(2743, 4.6647, 0.4138, 0.232),
             column(2740, 1.0404e6, 13.7e3, -0.33),
-        ],
+            column(2743, 1580.12, 30.37, 0.412),
+            column(2743, 1712.5, 41.8, 0.377),
+        ]),
     };
     insta::assert_snapshot!(printed_summary(&summary));
 }
@@ -51,7 +54,8 @@ fn what_no_realization_has_is_left_out() {
         other_extremum: Extremum::First,
         realizations: 1,
         failures,
-        columns: [nothing; 4],
+        velocity: nothing,
+        observables: PerObservable([nothing; 5]),
     };
     insta::assert_snapshot!(printed_summary(&summary));
 }

@@ -1,5 +1,6 @@
 //! The observables of a job's realizations.
 
+use osteon_common::observables::{Observable, ObservableRow};
 use osteon_common::outcome::FailureKind;
 use osteon_common::visible;
 
@@ -15,14 +16,21 @@ const MEAN_DIGITS: usize = 5;
 
 /// Returns a row for each observable, the failures, and the file.
 pub(super) fn table(shown: &ShownObservations<'_>) -> String {
-    let ObservationSummary { other_extremum, realizations, failures, columns } = shown.summary;
-    let other = format!("velocity of the {} extremum (m/s)", other_extremum.name());
-    let names = ["velocity (m/s)", &other, "decay along the array (dB/cm)", "frequency (MHz)"];
-    let units = [1.0, 1.0, 1.0, 1e-6];
+    let ObservationSummary { other_extremum, realizations, failures, velocity, observables } =
+        shown.summary;
     let heading = ["", "count", "mean", "std. dev.", "correlation"];
-    let mut rows = vec![heading.map(str::to_owned)];
-    for ((name, unit), column) in names.into_iter().zip(units).zip(columns) {
-        rows.push(row(name, unit, column));
+    let mut rows = vec![heading.map(str::to_owned), row("velocity (m/s)", 1.0, velocity)];
+    for (observable, column) in observables.iter() {
+        let ObservableRow { title, short, unit, .. } = observable.row();
+        let title = match observable {
+            Observable::OtherVelocity => {
+                format!("velocity of the {} extremum", other_extremum.name())
+            }
+            Observable::CenterFrequency => (*short).to_owned(),
+            _ => (*title).to_owned(),
+        };
+        let (unit, scale) = if *unit == "Hz" { ("MHz", 1e-6) } else { (*unit, 1.0) };
+        rows.push(row(&format!("{title} ({unit})"), scale, column));
     }
     let mut text = aligned(&rows);
     text.push_str(&wrapped("correlation: with the velocity, over the realizations that have both"));

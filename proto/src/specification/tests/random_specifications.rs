@@ -177,6 +177,7 @@ fn layered() -> impl Strategy<Value = Setup> {
         setup.layers.bone_attenuation.quality_factor = quality;
         (setup.probe.tilt, setup.probe.bidirectional) = (-0.02 * refinement, quality.is_some());
         setup.probe.element_width = 1e-4 * refinement;
+        setup.probe.guided_wave_frequency = quality.map(|quality| 1e4 * quality);
         setup.probe.pulse = match quality {
             Some(_) => PulseForm { shape: PulseShape::Tone, cycles: 4.0 * refinement },
             None => PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() },

@@ -18,8 +18,9 @@ const BELOW_LEAST: f64 = 1.0 - 1e-9;
 const HALVINGS: usize = 50;
 /// The group velocity is the difference quotient over this part of the wavenumber in both directions.
 const GROUP_STEP: f64 = 1e-4;
-/// If a count is undecided because a pivot is exactly zero, it is repeated at the wavenumber times this.
-const BESIDE: f64 = 1.0 + 1e-13;
+/// If a count is undecided because a pivot is exactly zero, it is repeated at the wavenumber times one of these.
+/// In a thin plate a larger step is needed: the pivot of a wave of extension or shear is (kh)² times the change.
+const BESIDE: [f64; 4] = [1.0 + 1e-13, 1.0 + 1e-11, 1.0 + 1e-9, 1.0 + 1e-7];
 
 /// One guided wave at one frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,7 +122,7 @@ impl FreeBone {
             }
             WaveCounter::Stack(stack) => stack.count(family, k, omega),
         };
-        at(k).or_else(|| at(BESIDE * k))
+        at(k).or_else(|| BESIDE.into_iter().find_map(|factor| at(factor * k)))
     }
 }
 
