@@ -92,6 +92,38 @@ fn the_best_point_of_a_result_is_observed() {
     assert!(velocities(&observed).eq(velocities(&out.join("realizations.csv"))));
 }
 
+/// Velocities leave one direction of porosity, thickness and dispersion free, which A0 at a low frequency
+/// determines.
+#[test]
+fn a_measured_a0_tells_the_thickness() {
+    let scratch = Scratch::new();
+    let setup = |thickness: f64, porosity: f64| {
+        format!(
+            "[layers.bone]\nthickness = {thickness}\n[probe]\nguided_wave_frequency = 0.2e6\n\
+             [bone]\nporosity = {porosity}\n"
+        )
+    };
+    let bones = "[parameters]\ndispersion = { fixed = 0.08 }\n[monte_carlo]\nrealizations = 40\n";
+    let truth = scratch.write("truth.toml", &format!("{}{bones}", setup(2.5e-3, 0.1)));
+    run(&["observe", text(&truth), "--out", text(&scratch.path("bones.csv"))]).succeeded();
+    let interval = |line: &str| {
+        let job = format!(
+            "[data]\nvelocities = \"bones.csv\"\n{line}\n{}[parameters]\n\
+             porosity = {{ bounds = [0.01, 0.3] }}\nbone_thickness = {{ bounds = [1.5e-3, 4e-3] }}\n\
+             dispersion = {{ start = 0.1, bounds = [0.02, 0.3] }}\n[monte_carlo]\nsampling = \"sobol\"\n\
+             realizations = 64\ncontrol_variate = true\n[search]\nmethod = \"newton\"\n",
+            setup(2.8e-3, 0.12)
+        );
+        let job = scratch.write("job.toml", &job);
+        let found = run(&["identify", text(&job), "--json"]).json();
+        let interval = &found["identified"]["parameters"]["bone_thickness"]["interval"];
+        interval.as_array().map(|ends| [0, 1].map(|end| ends[end].as_f64().unwrap()))
+    };
+    assert_eq!(interval(""), None);
+    let [lower, upper] = interval("a0_velocity = \"a0_velocity\"").unwrap();
+    assert!((lower..upper).contains(&2.5e-3) && upper - lower < 0.3e-3, "{lower} to {upper}");
+}
+
 #[test]
 fn no_file_is_overwritten() {
     let scratch = Scratch::new();
