@@ -360,3 +360,21 @@ fn middle([lower, upper]: [f64; 2]) -> f64 {
 fn mean_of(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use osteon_solver::Isa;
+
+    use super::*;
+
+    #[test]
+    fn intervals_of_porosity_and_dispersion_hold_them() {
+        let twins = Twins { repetitions: 4, seed: 5, isa: Isa::fastest() };
+        let table = coverage(&twins, &|_| {}).unwrap();
+        assert_eq!(table.rows().len(), 2 * COUNTS.len());
+        for row in table.rows() {
+            assert_eq!([&row[2], &row[3]], ["4", "0"], "{table}");
+            assert!(row[4].parse::<f64>().unwrap() >= 75.0, "{table}");
+        }
+    }
+}
