@@ -62,7 +62,7 @@ fn setup() -> impl Strategy<Value = Setup> {
             3_u32..=64,
         ),
         (prop_oneof![2 => Just(0.0), 1 => -0.9..0.9], any::<bool>()),
-        (pulse(), prop_oneof![2 => Just(0.0), 1 => 0.0..0.99]),
+        (pulse(), prop_oneof![2 => Just(0.0), 1 => 0.0..0.99], prop::option::of(decades(0.0, 9.0))),
     );
     let plate = prop_oneof![1 => decades(-6.0, -3.3), 3 => decades(-3.3, -2.09)];
     (fluid(), plate, fluid(), probe).prop_map(
@@ -70,7 +70,13 @@ fn setup() -> impl Strategy<Value = Setup> {
             coupling,
             bone_thickness,
             marrow,
-            (center_frequency, heights, row, (share, bidirectional), (pulse, width)),
+            (
+                center_frequency,
+                heights,
+                row,
+                (share, bidirectional),
+                (pulse, width, guided_wave_frequency),
+            ),
         )| Setup {
             layers: Layers { coupling, bone_thickness, marrow, ..Layers::default() },
             probe: Probe {
@@ -79,6 +85,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                 center_frequency,
                 amplitude: 100.0,
                 pulse,
+                guided_wave_frequency,
                 element_width: width * row.0.min(row.1),
                 source: Source { x1: 0.0, x3: heights.0 * coupling.thickness },
                 receivers: Receivers {
