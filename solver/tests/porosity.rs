@@ -34,22 +34,24 @@ fn model_of_usual_density() -> CasePorosityModel {
     CasePorosityModel { matrix, ..CasePorosityModel::default() }
 }
 
-/// Returns by how much a plate of six sublayers, whose porosities rise linearly from the skin's side to the
-/// marrow's, is faster than a homogeneous one of their mean porosity, m/s.
-fn gain_of_gradient(model: &CasePorosityModel, thickness: f64, [from, to]: [f64; 2]) -> f64 {
-    let sublayers: Vec<_> = (0..6)
-        .map(|i| {
-            let porosity = (to - from).mul_add((f64::from(i) + 0.5) / 6.0, from);
-            Sublayer { thickness: thickness / 6.0, solid: model.bone(porosity).unwrap() }
-        })
-        .collect();
-    let sublayers = Sublayers::new(&sublayers).unwrap();
+/// Returns by how much a plate of six sublayers of equal thickness, with these porosities from the skin's side
+/// to the marrow's, is faster than a homogeneous one of their mean porosity, m/s.
+fn gain_of_profile(model: &CasePorosityModel, thickness: f64, porosities: [f64; 6]) -> f64 {
+    let sublayer =
+        |porosity| Sublayer { thickness: thickness / 6.0, solid: model.bone(porosity).unwrap() };
+    let sublayers = Sublayers::new(&porosities.map(sublayer)).unwrap();
     let mut setup = Setup::default();
     setup.layers.bone_thickness = sublayers.thickness();
     let (solver, mut workspace) = (Solver::new(&setup), Workspace::default());
-    let homogeneous = model.bone(f64::midpoint(from, to)).unwrap();
+    let homogeneous = model.bone(porosities.iter().sum::<f64>() / 6.0).unwrap();
     let mean = solver.arrival(&homogeneous, &mut workspace).unwrap().velocity;
     solver.arrival(&sublayers, &mut workspace).unwrap().velocity - mean
+}
+
+/// Returns the gain of a linear profile, by the porosities at the middle of each sublayer.
+fn gain_of_gradient(model: &CasePorosityModel, thickness: f64, [from, to]: [f64; 2]) -> f64 {
+    let middle = |i: u32| (to - from).mul_add((f64::from(i) + 0.5) / 6.0, from);
+    gain_of_profile(model, thickness, [0, 1, 2, 3, 4, 5].map(middle))
 }
 
 /// In a thick plate the first signal runs in the dense bone below the skin. The expected gains are those of an
@@ -65,6 +67,17 @@ fn a_gradient_is_faster_than_its_mean_in_a_thick_plate_only() {
     ] {
         let gain = gain_of_gradient(&model, thickness, porosities);
         assert!((gain - expected).abs() < 3.0, "{porosities:?} in {thickness} m: {gain} m/s");
+    }
+}
+
+/// A dense outer half above a porous endosteal one, of 20 % in its mean: the same independent code says +138 m/s
+/// in 4 mm and +5 m/s in 1.5 mm.
+#[test]
+fn a_porous_endosteal_half_hardly_slows_the_first_signal_of_a_thick_plate() {
+    let profile = [0.05, 0.05, 0.05, 0.125, 0.2, 0.275];
+    for (thickness, expected) in [(4e-3, 138.0), (1.5e-3, 5.0)] {
+        let gain = gain_of_profile(&model_of_usual_density(), thickness, profile);
+        assert!((gain - expected).abs() < 3.0, "{thickness} m: {gain} m/s");
     }
 }
 
