@@ -15,7 +15,7 @@ use crate::results_directory;
 ///
 /// # Errors
 /// If the results are not those of the job, or have no such point.
-pub fn chosen(
+pub fn choose(
     directory: Option<&Path>,
     group: Option<&str>,
     job: &InputFile,

@@ -56,7 +56,7 @@ impl Solver {
         index: u64,
         workspace: &mut Workspace,
     ) -> RealizationResult {
-        let solved = self.drawn(ensemble, index).and_then(|(own, bone)| {
+        let solved = self.draw(ensemble, index).and_then(|(own, bone)| {
             let solver = own.as_ref().unwrap_or(self);
             let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
             let (found, other_failure) =
@@ -89,7 +89,7 @@ impl Solver {
         index: u64,
         workspace: &mut Workspace,
     ) -> Result<ObservedRealization, FailureKind> {
-        let (own, bone) = self.drawn(ensemble, index)?;
+        let (own, bone) = self.draw(ensemble, index)?;
         let solver = own.as_ref().unwrap_or(self);
         let arrival = solver.arrival(&bone, workspace).map_err(|failure| failure.kind)?;
         let all = ObservableSet::new(|_| true);
@@ -98,7 +98,7 @@ impl Solver {
     }
 
     /// Returns the bone at `index` of an ensemble, and the solver of its setup if it has its own.
-    fn drawn(
+    fn draw(
         &self,
         ensemble: &Ensemble,
         index: u64,

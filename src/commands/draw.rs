@@ -25,7 +25,7 @@ pub(super) fn draw(arguments: &DrawArguments) -> Ended {
         )));
     }
     let PlaceArguments { at, group } = &arguments.place;
-    let point = job_point::chosen(at.as_deref(), group.as_deref(), &input, &specification)
+    let point = job_point::choose(at.as_deref(), group.as_deref(), &input, &specification)
         .map_err(CommandFailure::BadInput)?;
     let ensemble = specification.ensemble(&point).map_err(CommandFailure::bad_input)?;
     let drawn = ensemble.realization(index, &specification.setup).map_err(|error| {

@@ -26,7 +26,7 @@ pub(super) async fn observe(arguments: ObserveArguments, isa: Isa, cores: u32) -
         job_file::of_input(&input, JobKind::Propagation).map_err(CommandFailure::bad_input)?;
     let specification = noted.specification;
     let PlaceArguments { at, group } = &place;
-    let point = job_point::chosen(at.as_deref(), group.as_deref(), &input, &specification)
+    let point = job_point::choose(at.as_deref(), group.as_deref(), &input, &specification)
         .map_err(CommandFailure::BadInput)?;
     if let Some(out) = &out {
         new_files::refuse_existing(out)?;

@@ -1,8 +1,9 @@
-//! What data tell about the pores of bones: how often intervals of porosity and dispersion hold the truth, and
-//! what becomes of a porosity that changes through the thickness where the model's does not.
+//! Identifications of porosity from simulated data. [`coverage`] and [`profiles`] count how often intervals
+//! contain the true value; [`unmodelled`] measures the error of a model with one porosity when that of the
+//! bones changes through the thickness.
 
 use osteon_common::case::Setup;
-use osteon_common::inference::DerivedQuantity;
+use osteon_common::inference::{DerivedQuantity, Uncertainty};
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorSettings, Range, Sampling,
     Search, SearchMethod,
@@ -18,7 +19,7 @@ use rayon::prelude::*;
 use crate::generator::Generator;
 use crate::identify::{RealizationCache, Surroundings, identify};
 use crate::table::{MarkdownTable, millimetres, two_digits};
-use crate::twins::Twins;
+use crate::twins::{Twins, data_seed, errors, quantity_of};
 use crate::{RowCallback, StudyError};
 
 /// Default number of bones of [`coverage`].
@@ -54,6 +55,8 @@ const UNMODELLED: [([f64; 2], ProfileShape); 4] = [
 const THICKNESSES: [f64; 2] = [4e-3, 1.5e-3];
 /// Dispersion of the bones of [`unmodelled`].
 const DISPERSION: f64 = 0.1;
+/// Number of bones after which progress is reported.
+const BLOCK: usize = 20;
 
 /// Counts the 95 % intervals of porosity and dispersion that hold the truth, by the number of velocities, for
 /// bones whose porosity (3 to 25 %) and dispersion (0.05 to 0.2) are drawn uniformly.
@@ -89,9 +92,6 @@ pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTabl
     }
     Ok(table)
 }
-
-/// Number of bones after which progress is reported.
-const BLOCK: usize = 20;
 
 /// Counts the posterior intervals that hold the truth for bones whose porosity changes linearly through the
 /// thickness, from a hundred velocities, with both ends and the dispersion free. The truths are drawn from
@@ -196,13 +196,11 @@ type Found = (Option<DerivedQuantity>, f64);
 
 impl IntervalCount {
     fn add(&mut self, (found, truth): &Found) {
-        let Some((found, known)) = found.and_then(|found| found.known.map(|known| (found, known)))
-        else {
+        let known = found.as_ref().and_then(|found| found.known.zip(errors(found, *truth)));
+        let Some((Uncertainty { interval: [lower, upper], .. }, errors)) = known else {
             self.without += 1;
             return;
         };
-        let [lower, upper] = known.interval;
-        let errors = (found.value - truth) / known.standard_error;
         self.all += 1;
         self.held += u64::from((lower..=upper).contains(truth));
         self.squares = errors.mul_add(errors, self.squares);
@@ -229,7 +227,7 @@ fn identify_bone(
     bones.setup.pores.porosity = Some(truth[0]);
     let most = COUNTS.iter().max().copied().unwrap_or_default();
     let drawn = most as u64 + most as u64 / 20;
-    let seed = twins.seed + 1 + number;
+    let seed = data_seed(twins.seed, number);
     let velocities = bones.velocities(&matrix_point(truth[1]), drawn, seed, twins.isa)?;
     if velocities.len() < most {
         return Ok(None);
@@ -254,11 +252,11 @@ fn identify_pores(
     specification.setup.pores.porosity = Some(start);
     specification.parameters[Parameter::Porosity as usize] = free(POROSITY_BOUNDS, start);
     let found = identify(&specification, &mut RealizationCache::new(), twins.isa)?;
-    Ok(found.result.conclusions.inference.and_then(|found| {
-        let (_, porosity) =
-            found.parameters.iter().find(|(parameter, _)| *parameter == Parameter::Porosity)?;
-        Some([*porosity, found.dispersion])
-    }))
+    Ok(found
+        .result
+        .conclusions
+        .inference
+        .and_then(|found| Some([quantity_of(&found, Parameter::Porosity)?, found.dispersion])))
 }
 
 /// Returns the truth of bone number `number`, drawn from the prior, and its posterior. `None` if the point has
@@ -273,7 +271,7 @@ fn posterior_of_bone(twins: &Twins, number: u64) -> Result<Option<(Point, Poster
     let mut bones = Surroundings::default();
     let profile = &mut bones.setup.pores.profile;
     (profile.surface, profile.marrow) = (Some(surface), Some(marrow));
-    let seed = twins.seed + 1 + number;
+    let seed = data_seed(twins.seed, number);
     let mut velocities = bones.velocities(&truth, 2 * COUNTED, seed, twins.isa)?;
     if velocities.len() < COUNTED as usize {
         return Ok(None);

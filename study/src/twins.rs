@@ -272,7 +272,7 @@ fn setup_for(searched: Parameter) -> Setup {
 }
 
 /// Returns a seed whose germs differ from the model's.
-fn data_seed(seed: u64, number: u64) -> u64 {
+pub(crate) fn data_seed(seed: u64, number: u64) -> u64 {
     seed + 1 + number
 }
 
@@ -336,7 +336,8 @@ fn identify_data(
     Ok(identify(specification, known, isa)?.result.conclusions.inference)
 }
 
-fn quantity_of(found: &Inference, parameter: Parameter) -> Option<DerivedQuantity> {
+/// Returns a parameter that was identified; `None` if it was not searched.
+pub(crate) fn quantity_of(found: &Inference, parameter: Parameter) -> Option<DerivedQuantity> {
     match parameter {
         Parameter::Dispersion => Some(found.dispersion),
         _ => found.parameters.iter().find(|(name, _)| *name == parameter).map(|(_, found)| *found),
@@ -344,7 +345,7 @@ fn quantity_of(found: &Inference, parameter: Parameter) -> Option<DerivedQuantit
 }
 
 /// Returns the distance from the truth in standard errors.
-fn errors(found: &DerivedQuantity, truth: f64) -> Option<f64> {
+pub(crate) fn errors(found: &DerivedQuantity, truth: f64) -> Option<f64> {
     found.known.map(|known| (found.value - truth) / known.standard_error)
 }
 

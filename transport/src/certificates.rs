@@ -50,7 +50,8 @@ impl Authority {
     pub fn new(now: OffsetDateTime) -> Result<(Self, PemPair), rcgen::Error> {
         let key = KeyPair::generate()?;
         let mut params = CertificateParams::default();
-        params.distinguished_name = named(&format!("osteon authority of {}", now.date()));
+        params.distinguished_name =
+            distinguished_name(&format!("osteon authority of {}", now.date()));
         params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
         params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
         params.not_before = now - CLOCK_MARGIN;
@@ -93,7 +94,7 @@ impl Authority {
             CertificateHolder::Worker => ("osteon worker", ExtendedKeyUsagePurpose::ClientAuth),
             CertificateHolder::Client => ("osteon client", ExtendedKeyUsagePurpose::ClientAuth),
         };
-        params.distinguished_name = named(name);
+        params.distinguished_name = distinguished_name(name);
         params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
         params.extended_key_usages = vec![usage];
         params.use_authority_key_identifier_extension = true;
@@ -105,7 +106,7 @@ impl Authority {
     }
 }
 
-fn named(name: &str) -> rcgen::DistinguishedName {
+fn distinguished_name(name: &str) -> rcgen::DistinguishedName {
     let mut distinguished = rcgen::DistinguishedName::new();
     distinguished.push(DnType::OrganizationName, "osteon");
     distinguished.push(DnType::CommonName, name);
