@@ -15,8 +15,8 @@ const SHORT_S: f64 = 20.0;
 /// Jobs longer than this, s of wall time, are announced.
 const LONG_S: f64 = 300.0;
 
-/// Says so on stderr if a job that is about to be run on this machine takes remarkably long. This takes
-/// a few milliseconds if it does not.
+/// Says so on stderr if a job that is about to be run on this machine takes remarkably long. For other jobs
+/// the measurement takes a few milliseconds.
 pub(crate) async fn say_if_remarkable(specification: &JobSpecification, isa: Isa, threads: u32) {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let cores = threads.min(u32::try_from(cores).unwrap_or(threads));

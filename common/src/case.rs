@@ -27,8 +27,8 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Returns each section with its key, in the order of a canonical file, but for the bone's: it is that
-    /// of a job or of a case.
+    /// Returns each section with its key, in the order of a canonical file, except `bone`, whose
+    /// keys differ between a job file and a case file.
     pub fn sections(&mut self) -> [(Key, &mut dyn Section); 4] {
         [
             (Key { name: "layers", meaning: "the three layers" }, &mut self.layers),

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::moments::Moments;
-use crate::observables::ObservableMeans;
+use crate::observables::ObservableValues;
 use crate::parameters::{Parameter, Point};
 use crate::posterior::Posterior;
 
@@ -90,7 +90,7 @@ pub struct Sensitivity {
     /// The same for the coefficient of variation, ∂ ln Δ / ∂ ln p.
     pub coefficient_of_variation: f64,
     /// The same for the means of the measured observables, relative to those of the data.
-    pub observables: ObservableMeans,
+    pub observables: ObservableValues,
 }
 
 /// Relative standard errors of both moments.

@@ -143,8 +143,8 @@ impl ElasticityLaw {
         realize(&self.triangle(germs), &self.factor)
     }
 
-    /// Returns the realizations for these germs of laws with the same dispersion and other means: `[G]` is
-    /// that of [`ElasticityLaw::realize`] for all of them.
+    /// Returns a function from a mean elasticity to its realization with these germs and the dispersion of
+    /// this law; `[G]` is computed once for all means.
     pub fn realize_about(
         &self,
         germs: &Germs,

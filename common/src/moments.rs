@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::observables::{OBSERVABLES, Observable, ObservableMeans, PerObservable};
+use crate::observables::{OBSERVABLES, Observable, ObservableValues, PerObservable};
 
 /// Number of the moments in which a model and data are compared.
 pub const MOMENTS: usize = 2 + OBSERVABLES;
@@ -34,7 +34,7 @@ pub struct ComparedMoments {
     /// Those of the velocities.
     pub velocities: Moments,
     /// Means of the other observables; of a model those that were measured, or all that are known.
-    pub observables: ObservableMeans,
+    pub observables: ObservableValues,
 }
 
 impl ComparedMoments {

@@ -157,7 +157,7 @@ pub struct PerObservable<T>(pub [T; OBSERVABLES]);
 pub type ObservableSet = PerObservable<bool>;
 
 /// Means of those observables that are known.
-pub type ObservableMeans = PerObservable<Option<f64>>;
+pub type ObservableValues = PerObservable<Option<f64>>;
 
 /// The values of those observables that there are, each in its unit, one for each velocity of data or for
 /// each realization.

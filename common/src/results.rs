@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::conclusions::Conclusions;
 use crate::job::{Objective, Sampling, Search};
 use crate::moments::{KolmogorovTest, MomentIntervals, Outlier};
-use crate::observables::ObservableMeans;
+use crate::observables::ObservableValues;
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
 use crate::posterior::PosteriorDraw;
@@ -130,7 +130,7 @@ pub struct Evaluation {
     /// derivative, also `None` if other realizations failed than at the best point.
     pub moments: Option<Moments>,
     /// Means over the successes of the observables that were measured, where there are moments.
-    pub observables: ObservableMeans,
+    pub observables: ObservableValues,
     /// Cost; infinite at an infeasible point; `None` for a propagation.
     pub cost: Option<f64>,
     /// Failed realizations by kind.

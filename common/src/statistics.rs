@@ -16,7 +16,7 @@ mod sum;
 
 use crate::job::{MonteCarlo, Sampling};
 use crate::moments::{ComparedMoments, Estimate, Moments};
-use crate::observables::ObservableMeans;
+use crate::observables::ObservableValues;
 use crate::outcome::Outcome;
 use crate::outcomes::Outcomes;
 use crate::parameters::Point;
@@ -89,7 +89,7 @@ pub struct PointStatistics {
     /// Moments over the successes, unless there are none.
     pub moments: Option<Moments>,
     /// Means over the successes of the observables that were measured.
-    pub observables: ObservableMeans,
+    pub observables: ObservableValues,
     /// Whether at most the accepted fraction of realizations failed, and at least one succeeded.
     pub feasible: bool,
 }
@@ -109,7 +109,7 @@ impl PointStatistics {
         let moments =
             Sample::from_outcomes(monte_carlo, point, outcomes).map(|sample| sample.moments());
         let within = failed as f64 / outcomes.len() as f64 <= monte_carlo.max_failed_fraction;
-        let observables = ObservableMeans::default();
+        let observables = ObservableValues::default();
         Self { moments, observables, feasible: moments.is_some() && within }
     }
 

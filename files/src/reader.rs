@@ -125,7 +125,7 @@ impl Reader {
                 break;
             }
             let suggestion = match suggestions::of_key(&path, key, keys) {
-                // A case file has none of the sections of jobs.
+                // A case file lacks some sections of a job file.
                 Suggestion::Section(section) if !self.sections.contains(&section) => {
                     Suggestion::None
                 }
@@ -309,7 +309,7 @@ impl Reader {
         let wrong = elements.iter().enumerate().filter(|(_, node)| read(&node.value).is_none());
         for (count, (index, node)) in wrong.enumerate() {
             if count == REPORTED_MAX {
-                self.violations.add_more(path, "more elements that are not numbers are not listed");
+                self.violations.add_more(path, "further wrong elements are not listed");
                 break;
             }
             self.wrong_type(element_path(path, index), expected, &node.value);

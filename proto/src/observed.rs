@@ -1,7 +1,7 @@
 //! Values of observables as messages, which name each observable as the table in `osteon-common` does.
 
 use osteon_common::observables::{
-    Observable, ObservableMeans, ObservableSet, ObservedColumns, PerObservable,
+    Observable, ObservableValues, ObservableSet, ObservedColumns, PerObservable,
 };
 
 use crate::malformed::Malformed;
@@ -30,7 +30,7 @@ pub fn columns_from_messages(
     Ok(columns)
 }
 
-pub(crate) fn means_to_messages(means: &ObservableMeans) -> Vec<v1::ObservableMean> {
+pub(crate) fn means_to_messages(means: &ObservableValues) -> Vec<v1::ObservableMean> {
     let message = |(one, &mean): (Observable, &f64)| v1::ObservableMean {
         observable: one.name().to_owned(),
         mean,
@@ -40,8 +40,8 @@ pub(crate) fn means_to_messages(means: &ObservableMeans) -> Vec<v1::ObservableMe
 
 pub(crate) fn means_from_messages(
     messages: &[v1::ObservableMean],
-) -> Result<ObservableMeans, Malformed> {
-    let mut means = ObservableMeans::default();
+) -> Result<ObservableValues, Malformed> {
+    let mut means = ObservableValues::default();
     for v1::ObservableMean { observable, mean } in messages {
         put(&mut means, observable, *mean)?;
     }

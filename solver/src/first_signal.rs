@@ -5,7 +5,7 @@ use std::f64::consts::LN_10;
 
 use osteon_common::bone::{BoneRef, CaseBone};
 use osteon_common::case::Setup;
-use osteon_common::observables::{Observable, ObservableMeans, ObservableSet, PerObservable};
+use osteon_common::observables::{Observable, ObservableValues, ObservableSet, PerObservable};
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::{Ensemble, Realization};
 use osteon_common::settings::{Extremum, Picking};
@@ -31,8 +31,8 @@ pub struct FirstSignal {
     /// Decay of the picked extremum along the array, dB/cm: minus the least-squares slope of 20 log10 |p|
     /// against the distance along the probe, from the first source. Negative where |p| grows.
     pub decay: f64,
-    /// Frequency of the signal, Hz: 1/(2 T), with T the mean over the receivers of the time from the first
-    /// extremum to the second, from the first source; `None` if one of them was not picked.
+    /// Frequency of the signal, Hz: 1/(2 T), with T the mean over the receivers of the time between first and
+    /// second extremum, in waves of the first source; `None` if one of them was not picked.
     pub center_frequency: Option<f64>,
 }
 
@@ -42,13 +42,13 @@ pub struct ObservedRealization {
     /// Velocity, m/s: that of [`Solver::realization`], to the bit.
     pub velocity: f64,
     /// The other observables, where there are any.
-    pub observables: ObservableMeans,
+    pub observables: ObservableValues,
 }
 
 impl Solver {
-    /// Computes a realization as [`Solver::realization`] does, and these observables of it. The decay takes
-    /// no further pass, other velocity and centre frequency take a second one. A realization that lacks one of
-    /// them is a failure: of the kind of the other extremum's, or `not_finite`.
+    /// Computes a realization as [`Solver::realization`] does, and these observables of it. The decay costs
+    /// nothing more; for other velocity and centre frequency the case is solved once more. A realization that
+    /// lacks one of them is a failure: of the kind with which the other extremum failed, or `not_finite`.
     pub fn realization_with(
         &self,
         observables: ObservableSet,
@@ -116,7 +116,7 @@ impl Solver {
         bone: BoneRef<'_>,
         arrival: &Arrival,
         workspace: &mut Workspace,
-    ) -> (ObservableMeans, Option<FailureKind>) {
+    ) -> (ObservableValues, Option<FailureKind>) {
         let needs_other = wanted[Observable::OtherVelocity] || wanted[Observable::CenterFrequency];
         let other = needs_other.then(|| self.other_arrival(bone, workspace));
         let picked = other.as_ref().and_then(|other| other.as_ref().ok());
@@ -130,7 +130,7 @@ impl Solver {
             Observable::A0Velocity => phase_velocity(waves?.a0),
             Observable::S0Velocity => phase_velocity(waves?.s0),
         };
-        let found = ObservableMeans::new(|one| if wanted[one] { value(one) } else { None });
+        let found = ObservableValues::new(|one| if wanted[one] { value(one) } else { None });
         (found, other.and_then(|other| other.err().map(|failure| failure.kind)))
     }
 

@@ -63,7 +63,7 @@ pub(crate) struct CoordinatorArguments {
     #[arg(long, value_name = "S", default_value = "10", value_parser = lease)]
     pub(crate) lease: Duration,
     /// Export metrics for Prometheus at http://ADDR/metrics (IP:PORT; port 0 selects a free port).
-    /// They are numbers without names; everyone who can reach the address can read them. The URL is
+    /// They name no user, job or host; everyone who can reach the address can read them. The URL is
     /// written to DIR/metrics-address [default: none]
     #[arg(long, value_name = "ADDR", value_parser = tcp_address)]
     pub(crate) metrics: Option<SocketAddr>,

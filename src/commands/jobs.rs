@@ -186,8 +186,12 @@ async fn fetch(job: String, coordinator: Remote, out: PathBuf) -> Ended {
     Ok(ExitStatus::Done)
 }
 
-/// Returns whether the fetched result replaces the one stored in `out`. It does not if both are the
-/// same, and a completed run is never replaced.
+/// Returns whether the fetched result replaces the one stored in `out`: if only what is known of its
+/// integrity differs, if it is the stored result computed again without a banned host, or if the stored run
+/// was cancelled or failed.
+///
+/// # Errors
+/// If `out` has another result of a completed run, which is never replaced.
 fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, CommandFailure> {
     let specification = &fetched.specification;
     let new = &fetched.result;

@@ -35,7 +35,7 @@ const KEPT: Duration = Duration::from_secs(60);
 /// Prepares a server.
 ///
 /// # Errors
-/// When arguments and environment do not say where.
+/// If arguments and environment do not say where the models are evaluated.
 pub(super) fn prepare(
     arguments: UmbridgeArguments,
     context: &ProcessContext,

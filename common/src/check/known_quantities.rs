@@ -76,7 +76,7 @@ fn values(
             "is given, but each of layers.coupling.sublayers has its own; leave one of them out";
         return violations.add(field(speed, group, origin), message);
     }
-    // Not by way of a point, where 0 means that the setup's value stays.
+    // Set directly and not through a `Point`, in which a known 0 would stand for the setup's value.
     let with = |setup: Setup, (parameter, value): (Parameter, f64)| {
         parameter.of_setup().map_or(setup, |quantity| quantity.with(value, setup))
     };

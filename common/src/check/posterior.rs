@@ -49,7 +49,7 @@ pub(super) fn posterior_of_job(specification: &JobSpecification, violations: &mu
     if specification.monte_carlo.realizations == 1 && !known_wrong(realizations, violations) {
         violations.add(
             realizations,
-            "is 1; a posterior needs the law of velocities that differ, so at least 2",
+            "is 1; a posterior needs the distribution of the velocities, hence at least 2 realizations",
         );
     }
     all_draws(specification, settings, violations);
@@ -84,7 +84,7 @@ fn all_draws(
     let draws = settings.draws;
     if draws.saturating_mul(sets) > DRAWS_ALL_MAX {
         let message =
-            format!("is {draws}, for each of {sets} groups; all have at most {DRAWS_ALL_MAX}");
+            format!("is {draws}, for each of {sets} groups; all together may have {DRAWS_ALL_MAX}");
         violations.add("posterior.draws", message);
     }
 }

@@ -5,7 +5,7 @@ use crate::job::{MonteCarlo, Sampling};
 use crate::moments::{
     ComparedMoments, MomentMatrix, ObservableEstimate, ObservableEstimates, moment_vector,
 };
-use crate::observables::ObservableMeans;
+use crate::observables::ObservableValues;
 use crate::outcomes::Outcomes;
 
 use super::blocks::{self, DoublingFactors};
@@ -22,7 +22,7 @@ struct ValueScatter {
 
 /// Returns the mean of each observable of these outcomes over the realizations that succeeded, unless
 /// none did.
-pub fn observable_means(outcomes: &Outcomes) -> ObservableMeans {
+pub fn observable_means(outcomes: &Outcomes) -> ObservableValues {
     outcomes.observables().map(|values| {
         let values = successes(outcomes, values?);
         mean(values).map(|(_, mean)| mean)

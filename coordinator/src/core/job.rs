@@ -140,24 +140,24 @@ impl Job {
 
     /// Returns all evaluations under way; the one that the search asked for comes first.
     pub(crate) fn evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
-        self.certain_evaluations().chain(&self.speculation.evaluations)
+        self.needed_evaluations().chain(&self.speculation.evaluations)
     }
 
     /// Returns the evaluation that the search asked for, and those that it will ask for.
-    pub(crate) fn certain_evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
+    pub(crate) fn needed_evaluations(&self) -> impl Iterator<Item = &PendingEvaluation> {
         self.evaluation().into_iter().chain(self.ahead.evaluations())
     }
 
-    /// Same as [`Job::certain_evaluations`].
-    pub(crate) fn certain_evaluations_mut(
+    /// Same as [`Job::needed_evaluations`].
+    pub(crate) fn needed_evaluations_mut(
         &mut self,
     ) -> impl Iterator<Item = &mut PendingEvaluation> {
         self.stage.evaluation_mut().into_iter().chain(self.ahead.evaluations_mut())
     }
 
-    /// Returns the one of [`Job::certain_evaluations`] with this attempt.
+    /// Returns the one of [`Job::needed_evaluations`] with this attempt.
     pub(crate) fn certain_evaluation(&self, attempt: u64) -> Option<&PendingEvaluation> {
-        self.certain_evaluations().find(|evaluation| evaluation.attempt == attempt)
+        self.needed_evaluations().find(|evaluation| evaluation.attempt == attempt)
     }
 
     /// Same as [`Job::certain_evaluation`].
@@ -165,7 +165,7 @@ impl Job {
         &mut self,
         attempt: u64,
     ) -> Option<&mut PendingEvaluation> {
-        self.certain_evaluations_mut().find(|evaluation| evaluation.attempt == attempt)
+        self.needed_evaluations_mut().find(|evaluation| evaluation.attempt == attempt)
     }
 
     /// Same as [`Job::evaluations`].

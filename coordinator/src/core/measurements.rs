@@ -19,7 +19,7 @@ pub(crate) struct StateMeasurements {
     pub(crate) jobs_waiting: u64,
     pub(crate) jobs_running: u64,
     pub(crate) jobs_ended: u64,
-    /// Realizations of the evaluations under way that no worker holds.
+    /// Realizations that no worker holds, of evaluations that a search needs (not of speculative ones).
     pub(crate) realizations_waiting: u64,
     pub(crate) slots_busy: u64,
     pub(crate) slots_idle: u64,
@@ -76,7 +76,7 @@ impl StateMeasurements {
             Stage::Waiting => self.jobs_waiting += 1,
             _ => self.jobs_running += 1,
         }
-        for evaluation in job.certain_evaluations() {
+        for evaluation in job.needed_evaluations() {
             self.realizations_waiting += evaluation.queued() + evaluation.quarantine.len() as u64;
         }
         self.slots_wanted += slots_wanted(job);
@@ -105,10 +105,9 @@ fn used_fraction(what: Bounded, state: &State) -> f64 {
     used as f64 / most.max(1) as f64
 }
 
-/// Returns the number of slots that a job could keep busy. A search counts with all realizations of
-/// an evaluation until it ends, because the next evaluation follows at once: otherwise the number
-/// would fall to nothing at the end of each. Its groups and starts are computed at the same time, so
-/// each that is left counts.
+/// Returns the number of slots that a job could keep busy. Each group and start of a search that has not
+/// ended counts with all realizations of an evaluation, however many of the present one are done: the next
+/// evaluation follows at once, and the number would otherwise fall to nothing at the end of each.
 fn slots_wanted(job: &Job) -> u64 {
     let specification = &job.record.specification;
     let all = specification.monte_carlo.realizations;

@@ -1,7 +1,7 @@
 //! Proofs: before the answers of a worker count, it computes a few realizations of the same setup that
 //! other hosts compute, too, and its answer must be that of the majority.
 //!
-//! Every stay of a worker gives such a proof, since the machine may have changed, for each setup, since
+//! A worker gives such a proof in each of its stays, as the machine may have changed, and for each setup, as
 //! a defect may show with one and not with another. The proofs of all hosts are votes of one ballot, so
 //! that it is known at once who is right. They are kept while the coordinator runs, also those of hosts
 //! that have left.
@@ -51,7 +51,7 @@ impl SetupKey {
 /// The proofs of one setup.
 #[derive(Debug)]
 pub(crate) struct SetupProofs {
-    /// What is computed. Its number is that of no evaluation.
+    /// What is computed. Its `id` is the attempt, which is the number of no evaluation.
     input: Arc<EvaluationInput>,
     /// The votes of the hosts.
     pub(crate) ballot: Ballot,
@@ -83,8 +83,8 @@ impl SetupProofs {
     }
 
     /// Records that a worker has given its proof. If too many have, the one that gave it longest ago is
-    /// forgotten: should it count again, it is asked for another proof, or an answer of it is audited. As far
-    /// fewer are attached than are remembered, workers that are asked again do not make each other forgotten.
+    /// forgotten: if its answers are needed later, it proves itself again, or one of them is audited. Far more
+    /// workers are remembered than can be attached, so that renewed proofs do not push each other out.
     pub(crate) fn give(&mut self, name: &WorkerName, now: Duration) {
         if self.given.len() >= PROVEN_WORKERS_MAX && !self.given.contains_key(name) {
             let longest_ago = self.given.iter().min_by_key(|(_, time)| **time);
@@ -121,13 +121,13 @@ impl Proofs {
         self.0.get_mut(setup)
     }
 
-    /// Returns the setup and its proofs that a batch with this number is for.
+    /// Returns the setup whose proofs have this attempt, with them.
     pub(crate) fn with_attempt(&self, attempt: u64) -> Option<(SetupKey, &SetupProofs)> {
         let found = self.0.iter().find(|(_, proofs)| proofs.attempt() == attempt);
         found.map(|(setup, proofs)| (*setup, proofs))
     }
 
-    /// Returns what batches with this number compute.
+    /// Returns what the batches of this attempt compute.
     pub(crate) fn input(&self, attempt: u64) -> Option<Arc<EvaluationInput>> {
         self.with_attempt(attempt).map(|(_, proofs)| Arc::clone(&proofs.input))
     }
@@ -140,9 +140,9 @@ impl Proofs {
         now: Duration,
     ) {
         if self.0.len() >= PROVEN_SETUPS_MAX {
-            // Proofs of setups in use are touched all the time, so the oldest are of one that is not.
-            let unused = self.0.iter().filter(|(_, proofs)| proofs.out.is_empty());
-            if let Some(oldest) = unused.min_by_key(|(_, it)| it.used).map(|(setup, _)| *setup) {
+            // Setups in use are touched all the time, so the least recently used one is not in use.
+            let without_batches = self.0.iter().filter(|(_, proofs)| proofs.out.is_empty());
+            if let Some(oldest) = without_batches.min_by_key(|(_, it)| it.used).map(|(setup, _)| *setup) {
                 self.0.remove(&oldest);
             }
         }
@@ -203,7 +203,8 @@ mod tests {
 
     use super::*;
 
-    /// When no more can be remembered, the names that come first are forgotten once and not by turns.
+    /// When no more can be remembered, the worker whose proof is the oldest is forgotten, not the one whose
+    /// name comes first.
     #[test]
     fn a_worker_that_gives_its_proof_again_is_remembered() {
         let mut proofs = Proofs::default();

@@ -1,7 +1,7 @@
 //! The objects `velocity` and `data`: moments of the model and of the data, and what is known of them.
 
 use osteon_common::moments::{ConfidenceInterval, KolmogorovTest, ObservableEstimates, Outlier};
-use osteon_common::observables::ObservableMeans;
+use osteon_common::observables::ObservableValues;
 use osteon_common::results::{self, BestPoint, DataSummary, Estimate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -109,7 +109,7 @@ pub struct MomentSlopes {
     pub moments: Moments,
     /// Those of the means of other observables, relative to those of the data.
     #[serde(flatten)]
-    pub observables: ObservableMeans,
+    pub observables: ObservableValues,
 }
 
 /// Moments of the data; where velocities were measured also their intervals, those far from

@@ -1,6 +1,6 @@
 //! The observables of one realization.
 
-use osteon_common::observables::{Observable, ObservableMeans};
+use osteon_common::observables::{Observable, ObservableValues};
 use osteon_common::outcome::{FailureKind, Outcome};
 use osteon_solver::ObservedRealization;
 
@@ -8,13 +8,13 @@ use osteon_solver::ObservedRealization;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Observation {
     pub(super) outcome: Outcome,
-    pub(super) observables: ObservableMeans,
+    pub(super) observables: ObservableValues,
 }
 
 impl Observation {
     /// Creates that of a realization without a velocity.
     pub(super) fn failed(kind: FailureKind) -> Self {
-        Self { outcome: Err(kind), observables: ObservableMeans::default() }
+        Self { outcome: Err(kind), observables: ObservableValues::default() }
     }
 
     /// Returns the velocity, or another observable.

@@ -18,7 +18,7 @@ fn row(specification: &JobSpecification, number: u64, cost: f64) -> Evaluation {
         role: EvaluationRole::default(),
         point: specification.start_of(0),
         moments: Some(Moments { mean: 3900.0, coefficient_of_variation: 0.03 }),
-        observables: osteon_common::observables::ObservableMeans::default(),
+        observables: osteon_common::observables::ObservableValues::default(),
         cost: Some(cost),
         failures: FailureCounts::default(),
         estimated_error: None,

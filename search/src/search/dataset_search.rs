@@ -4,7 +4,7 @@
 use osteon_common::ensemble::Germs;
 use osteon_common::inference::{MomentWeights, agreement, model_errors};
 use osteon_common::job::{JobSpecification, MonteCarlo, NoVariation, Objective, Range};
-use osteon_common::observables::ObservableMeans;
+use osteon_common::observables::ObservableValues;
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{ComparedMoments, Evaluation, EvaluationRole, GroupEnding, Status};
@@ -218,7 +218,7 @@ impl DatasetSearch {
             row.role = EvaluationRole { start, varied: Some(varied), ..row.role };
             row.moments = statistics.moments.filter(|_| self.fails_alike(&outcomes));
             if row.moments.is_none() {
-                row.observables = ObservableMeans::default();
+                row.observables = ObservableValues::default();
             }
         } else {
             self.method.tell(row.cost.unwrap_or(f64::INFINITY), statistics.compared());

@@ -1,7 +1,7 @@
 //! The pressure of the source on the rigid bone's face under a stack of fluids, stepped through time.
 //!
-//! By reciprocity it is the pressure at the source's place when the face is driven as the source is. There
-//! all waves are smooth, so that a mesh needs no node at the source.
+//! By reciprocity it is the pressure at the source's place when the face is driven as the source is. In
+//! this reciprocal problem all waves are smooth, so that a mesh needs no node at the source.
 
 use osteon_common::case::Setup;
 
@@ -44,7 +44,8 @@ impl ColumnLoad {
     pub(super) fn fill<V: Vector>(&mut self, k: Lanes, load: &mut [Lanes]) {
         let Self { column, node, weights, step, pulse, state } = self;
         let at = |n: usize| Lanes::splat(pulse[n]);
-        // ∫∫ of a load α t + β t² over one step, from its values; the pulse starts with a slope.
+        // The double time integral of the first step, divided by its square, of the parabola through 0 and
+        // the values after one and two steps: the pulse starts at 0, with a slope.
         let mean = Lanes::splat(0.25).mul_add(at(1), Lanes::splat(-1.0 / 24.0) * at(2));
         state.start::<V, _>(column, k, mean, *step);
         load[0] = Lanes::ZERO;

@@ -119,6 +119,6 @@ fn hand_batch(turn: &mut Turn, worker: WorkerId) -> Option<BatchId> {
 /// Returns the attempt at the evaluation whose realizations are sent next, and the number of those that
 /// wait. The evaluation that the search asked for comes first.
 fn next_evaluation(job: &Job) -> Option<(u64, u64)> {
-    let evaluation = job.certain_evaluations().find(|evaluation| !evaluation.queue.is_empty())?;
+    let evaluation = job.needed_evaluations().find(|evaluation| !evaluation.queue.is_empty())?;
     Some((evaluation.attempt, evaluation.queued()))
 }

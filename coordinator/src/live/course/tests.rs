@@ -76,7 +76,7 @@ fn row(specification: &JobSpecification, number: u64, group: u32) -> Evaluation 
         role: EvaluationRole { group, ..EvaluationRole::default() },
         point: specification.start_of(0),
         moments: Some(Moments { mean: 3900.0, coefficient_of_variation: 0.03 }),
-        observables: osteon_common::observables::ObservableMeans::default(),
+        observables: osteon_common::observables::ObservableValues::default(),
         cost: Some(1.0 / (number + 1) as f64),
         failures: FailureCounts::default(),
         estimated_error: None,

@@ -16,8 +16,8 @@ pub(super) const SCHEMA: &str = "
     CREATE TABLE evaluation (
         job INTEGER NOT NULL REFERENCES job(id),
         number INTEGER NOT NULL,
-        point BLOB NOT NULL,             -- seven or ten little-endian f64
-        outcomes BLOB NOT NULL,          -- per index: code byte, velocity as little-endian f64; more in `piece`
+        point BLOB NOT NULL,             -- little-endian f64: seven, or more if a quantity of the setup is searched
+        outcomes BLOB NOT NULL,          -- per index: code byte, velocity as little-endian f64
         estimated_error BLOB,            -- of the successes: median, largest, as little-endian f64
         workers TEXT NOT NULL,           -- whose answers are in it: a line each, PROCESS/INSTANCE HOST
         checksum BLOB NOT NULL,
@@ -29,7 +29,7 @@ pub(super) const SCHEMA: &str = "
         failure TEXT,                    -- of which kind it is
         reason TEXT,
         version TEXT NOT NULL,           -- of the program
-        numerics INTEGER NOT NULL,       -- their revision in it
+        numerics INTEGER NOT NULL,       -- revision of that program's numerics
         commit_id TEXT,                  -- that it was built from
         ended_ns INTEGER NOT NULL,
         evaluations INTEGER NOT NULL,
@@ -49,7 +49,7 @@ pub(super) const SCHEMA: &str = "
         number INTEGER PRIMARY KEY,
         host TEXT NOT NULL,
         process INTEGER NOT NULL,
-        instance INTEGER NOT NULL,       -- the number it drew, as a signed one
+        instance INTEGER NOT NULL,       -- random number that the process drew at its start; a u64 as i64
         job INTEGER NOT NULL,            -- in which it was found
         reason TEXT NOT NULL,
         at_ns INTEGER NOT NULL,          -- since the Unix epoch

@@ -44,7 +44,7 @@ impl Kernel for CountWaves<'_> {
     }
 }
 
-/// A real symmetric matrix, or its upper left part.
+/// An N×N array that holds a real symmetric matrix; a smaller one takes its upper left part.
 pub(super) type Real<const N: usize> = [[f64; N]; N];
 
 /// Returns the first lane of a number.
@@ -69,7 +69,7 @@ pub(super) fn joint_matrix<V: Vector>(joint: &Symmetric<V>) -> Real<FACES> {
 }
 
 /// Returns the stiffness of both faces of a layer in the displacements p and q: with u = p + i q on top
-/// and p - i q at the bottom,
+/// and p - i q at the bottom, A = [`Layer::top`] and D = [`Layer::down`],
 ///
 /// ```text
 /// [ Re A - Re D, -Im A - Im D; its transpose, Re A + Re D ]
@@ -97,8 +97,9 @@ pub(super) fn symmetric_entry(i: usize, j: usize) -> usize {
     low * (5 - low) / 2 + high
 }
 
-/// Eliminates these rows and columns of a matrix from `others`, and returns the number of negative
-/// eigenvalues of their part: that of the negative pivots. `None` if a pivot is zero or not finite.
+/// Eliminates `rows` (and the same columns) of a matrix, which leaves `others` with the Schur complement.
+/// Returns the number of negative pivots, which is that of the negative eigenvalues of the block of `rows`.
+/// `None` if a pivot is zero or not finite.
 #[inline(always)]
 pub(super) fn negative_pivots<const N: usize>(
     matrix: &mut Real<N>,

@@ -44,7 +44,7 @@ fn audit_for(
 ) -> Option<(Audit, u64)> {
     let is_of_other_host = |audit: &Audit| audit.by.host() != name.host();
     let (attempt, at, audited) =
-        state.jobs.get(&job)?.certain_evaluations().find_map(|evaluation| {
+        state.jobs.get(&job)?.needed_evaluations().find_map(|evaluation| {
             let at = evaluation.audits.iter().position(is_of_other_host)?;
             Some((evaluation.attempt, at, evaluation.audits.get(at)?.indices.count))
         })?;
@@ -53,7 +53,7 @@ fn audit_for(
     } else {
         let fleet = sizing::fleet_rate(state, job);
         let all =
-            state.jobs.get(&job)?.certain_evaluations().flat_map(|evaluation| &evaluation.audits);
+            state.jobs.get(&job)?.needed_evaluations().flat_map(|evaluation| &evaluation.audits);
         let waiting = all.map(|audit| audit.indices.count).sum();
         sizing::audit_size(state.workers.get(&worker)?, job, fleet, (audited, waiting))
     };

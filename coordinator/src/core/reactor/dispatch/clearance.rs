@@ -40,7 +40,7 @@ pub(crate) fn unproven_attempts(state: &State, job: JobId, now: Duration) -> BTr
     let confirms =
         |name: &WorkerName| proofs.is_given_by(name) && proofs.ballot.confirms(name.host(), voters);
     let unproven =
-        job.certain_evaluations().filter(|evaluation| !evaluation.workers.iter().all(confirms));
+        job.needed_evaluations().filter(|evaluation| !evaluation.workers.iter().all(confirms));
     unproven.map(|evaluation| evaluation.attempt).collect()
 }
 

@@ -14,12 +14,12 @@ pub(crate) fn work_waits(state: &State) -> bool {
     next_job(state).is_some() || checks_wait(state)
 }
 
-/// Returns the workers that can accept more, except those in `kept`, in the order of service.
+/// Returns the workers that can accept more, except `reserved` ones, in the order of service.
 pub(crate) fn free_workers<'a>(
     state: &'a State,
-    kept: &'a BTreeSet<WorkerId>,
+    reserved: &'a BTreeSet<WorkerId>,
 ) -> impl Iterator<Item = WorkerId> + 'a {
-    state.order.iter().map(|place| place.worker).filter(|worker| !kept.contains(worker))
+    state.order.iter().map(|place| place.worker).filter(|worker| !reserved.contains(worker))
 }
 
 /// Chooses the job that is served next, among the active jobs with work. The client with the least
@@ -45,7 +45,7 @@ pub(crate) fn checks_wait(state: &State) -> bool {
     let mut jobs = state.active.iter().filter_map(|id| state.jobs.get(id));
     jobs.any(|job| {
         let mut disputes = job.evaluation().into_iter().flat_map(|asked_for| &asked_for.disputes);
-        job.certain_evaluations().any(|evaluation| !evaluation.audits.is_empty())
+        job.needed_evaluations().any(|evaluation| !evaluation.audits.is_empty())
             || disputes.any(|dispute| votes::are_lacking(state, dispute))
     })
 }

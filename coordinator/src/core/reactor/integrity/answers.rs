@@ -195,7 +195,7 @@ fn fill(
     evaluation.fill(assignment.indices, solved, by);
     let news = evaluation.filled() - before;
     let asked_for =
-        |job: &&mut Job| job.certain_evaluations().any(|it| it.attempt == assignment.attempt);
+        |job: &&mut Job| job.needed_evaluations().any(|it| it.attempt == assignment.attempt);
     if let Some(job) = state.jobs.get_mut(&assignment.job).filter(asked_for) {
         job.rate.add(news, now);
         job.last_progress = now;

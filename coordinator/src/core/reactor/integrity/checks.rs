@@ -141,7 +141,7 @@ pub(crate) fn decide_proofs(turn: &mut Turn, setup: &SetupKey) {
     ban_outvoted_by_proofs(turn, setup);
     let jobs: Vec<JobId> = turn.state.active_jobs_of(setup).collect();
     for id in jobs {
-        let attempts = turn.state.jobs.get(&id).into_iter().flat_map(Job::certain_evaluations);
+        let attempts = turn.state.jobs.get(&id).into_iter().flat_map(Job::needed_evaluations);
         let attempts: Vec<u64> = attempts.map(|evaluation| evaluation.attempt).collect();
         for attempt in attempts {
             jobs::settle(turn, id, attempt);
@@ -274,8 +274,8 @@ fn give_up_audits(state: &mut State, id: JobId) -> Vec<u64> {
     let Some(job) = state.jobs.get_mut(&id) else {
         return Vec::new();
     };
-    let attempts: Vec<u64> = job.certain_evaluations().map(|it| it.attempt).collect();
-    let with = job.certain_evaluations_mut().filter(|it| !it.audits.is_empty());
+    let attempts: Vec<u64> = job.needed_evaluations().map(|it| it.attempt).collect();
+    let with = job.needed_evaluations_mut().filter(|it| !it.audits.is_empty());
     let pending: Vec<_> = with.map(|it| (it.attempt, std::mem::take(&mut it.audits))).collect();
     for (attempt, mut audits) in pending {
         audits.retain(|audit| state.can_check(audit.by.host()));

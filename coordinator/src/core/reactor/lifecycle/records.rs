@@ -127,7 +127,7 @@ fn go_on(turn: &mut Turn, id: JobId) {
 pub(crate) fn on_record_not_stored(turn: &mut Turn, id: JobId, key: RecordKey, error: String) {
     if key == RecordKey::Part {
         if let Some(job) = turn.state.jobs.get_mut(&id) {
-            job.certain_evaluations_mut().for_each(PendingEvaluation::save_again);
+            job.needed_evaluations_mut().for_each(PendingEvaluation::save_again);
         }
         return;
     }

@@ -121,7 +121,7 @@ pub(crate) fn save_parts(turn: &mut Turn, before_stop: bool) {
         let Some(job) = turn.state.jobs.get_mut(id) else {
             continue;
         };
-        for evaluation in job.certain_evaluations_mut().filter(|it| !unproven.contains(&it.attempt))
+        for evaluation in job.needed_evaluations_mut().filter(|it| !unproven.contains(&it.attempt))
         {
             let save_at = *evaluation.save_at.get_or_insert(now + SAVE_AFTER);
             if (before_stop || now >= save_at)
