@@ -22,7 +22,7 @@ pub enum Sampling {
 }
 
 impl Sampling {
-    /// All methods, in the order of a user's file.
+    /// All methods, in the order in which messages and documentation list them.
     pub const ALL: [Self; 2] = [Self::MonteCarlo, Self::Sobol];
 
     /// Returns the name used in files and messages.

@@ -58,7 +58,7 @@ pub struct Pores {
 }
 
 impl ProfileShape {
-    /// All shapes, in the order of a user's file.
+    /// All shapes, in the order in which messages and documentation list them.
     pub const ALL: [Self; 2] = [Self::Linear, Self::Endosteal];
 
     /// Returns the name used in files and messages.

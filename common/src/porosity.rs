@@ -116,7 +116,7 @@ pub enum NoPorousBone {
 }
 
 impl Homogenisation {
-    /// All estimates, in the order of a user's file.
+    /// All estimates, in the order in which messages and documentation list them.
     pub const ALL: [Self; 2] = [Self::MoriTanaka, Self::SelfConsistent];
 
     /// Returns the name used in files and messages.

@@ -58,7 +58,7 @@ pub enum PriorDistribution {
 }
 
 impl PriorDistribution {
-    /// All laws, in the order of a user's file.
+    /// All laws, in the order in which messages and documentation list them.
     pub const ALL: [Self; 3] = [Self::Uniform, Self::Normal, Self::LogNormal];
 
     /// Returns the name used in files and messages.

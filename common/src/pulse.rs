@@ -22,7 +22,8 @@ const RICKER_DELAY: f64 = 0.5;
 /// a hundredth of their peaks, rounded up from 1.16.
 const RICKER_BANDWIDTH: f64 = 1.2;
 /// Ratio, to the centre frequency, of the frequency from which on the paper's spectrum is less than a
-/// hundredth of its peak. A tone of n cycles comes so far above the centre frequency at 2/n of the distance.
+/// hundredth of its peak. The spectrum of a tone of n cycles falls to this level at 2/n of the paper's distance
+/// above the centre frequency.
 const PAPER_END: f64 = 2.38;
 
 /// The shape of a pulse.
@@ -38,7 +39,7 @@ pub enum PulseShape {
 }
 
 impl PulseShape {
-    /// All shapes, in the order of a user's file.
+    /// All shapes, in the order in which messages and documentation list them.
     pub const ALL: [Self; 3] = [Self::Paper, Self::Tone, Self::Ricker];
 
     /// Returns the name used in files and messages.
@@ -84,7 +85,7 @@ impl PulseForm {
             Some(cycles) if cycles < PAPER_CYCLES => {
                 (1.0 + (PAPER_END - 1.0) * PAPER_CYCLES / cycles) / PAPER_END
             }
-            // The kink at t = 0 is the same for all tones, and decides.
+            // A longer tone has a narrower spectrum, but the same tail of the kink at t = 0, which decides.
             Some(_) => 1.0,
         }
     }

@@ -60,7 +60,7 @@ pub struct RandomQuantities {
 }
 
 impl RandomDistribution {
-    /// All kinds, in the order of a user's file.
+    /// All kinds, in the order in which messages and documentation list them.
     pub const ALL: [Self; 3] = [Self::Normal, Self::LogNormal, Self::Uniform];
 
     /// Returns the name used in files and messages.

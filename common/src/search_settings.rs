@@ -26,7 +26,7 @@ pub enum Objective {
 }
 
 impl Objective {
-    /// All objectives, in the order of a user's file.
+    /// All objectives, in the order in which messages and documentation list them.
     pub const ALL: [Self; 3] = [Self::Moments, Self::Likelihood, Self::ChiSquare];
 
     /// Returns whether the cost depends on the two moments alone, and is 0 where both match.
@@ -61,7 +61,7 @@ pub enum SearchMethod {
 }
 
 impl SearchMethod {
-    /// All methods, in the order of a user's file.
+    /// All methods, in the order in which messages and documentation list them.
     pub const ALL: [Self; 3] = [Self::Simplex, Self::Newton, Self::Posterior];
 
     /// Returns the name used in files and messages.

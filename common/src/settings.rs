@@ -22,7 +22,7 @@ pub enum Extremum {
 }
 
 impl Extremum {
-    /// All criteria, in the order of a user's file.
+    /// All criteria, in the order in which messages and documentation list them.
     pub const ALL: [Self; 2] = [Self::First, Self::Second];
 
     /// Returns the name used in files and messages.
@@ -71,7 +71,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// All methods, in the order of a user's file.
+    /// All methods, in the order in which messages and documentation list them.
     pub const ALL: [Self; 2] = [Self::Exact, Self::Hybrid];
 
     /// Returns the name used in files and messages.

@@ -97,7 +97,9 @@ impl SetupQuantity {
     /// Returns what a message says of the key of the mean if the setup has none.
     pub(crate) fn lacking(self) -> &'static str {
         match self {
-            Self::CouplingSoundSpeed => "is that of each of its sublayers; leave one of them out",
+            Self::CouplingSoundSpeed => {
+                "is replaced by the sublayers of the coupling; leave out either these or this table"
+            }
             _ => "is not given; give both",
         }
     }

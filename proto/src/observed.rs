@@ -1,7 +1,7 @@
 //! Values of observables as messages, which name each observable as the table in `osteon-common` does.
 
 use osteon_common::observables::{
-    Observable, ObservableValues, ObservableSet, ObservedColumns, PerObservable,
+    Observable, ObservableSet, ObservableValues, ObservedColumns, PerObservable,
 };
 
 use crate::malformed::Malformed;

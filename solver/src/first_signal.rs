@@ -5,7 +5,7 @@ use std::f64::consts::LN_10;
 
 use osteon_common::bone::{BoneRef, CaseBone};
 use osteon_common::case::Setup;
-use osteon_common::observables::{Observable, ObservableValues, ObservableSet, PerObservable};
+use osteon_common::observables::{Observable, ObservableSet, ObservableValues, PerObservable};
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::{Ensemble, Realization};
 use osteon_common::settings::{Extremum, Picking};

@@ -1,4 +1,4 @@
-//! The digest of a batch on every instruction set of the machine, which must always be the same.
+//! The digest of an ensemble on every instruction set of the machine, which must always be the same.
 
 use osteon_common::digest::PathDigest;
 use osteon_common::outcome::Outcome;
@@ -11,7 +11,7 @@ use crate::table::{MarkdownTable, millimetres};
 use crate::{RowCallback, StudyError};
 
 /// Thickness of the plate, m, and dispersion: those of the paper, and a more difficult case.
-const BATCHES: [(f64, f64); 2] = [(4e-3, 0.1029), (2e-3, 0.45)];
+const ENSEMBLES: [(f64, f64); 2] = [(4e-3, 0.1029), (2e-3, 0.45)];
 /// Default number of realizations of each row.
 pub const REALIZATIONS: u64 = 2000;
 
@@ -22,7 +22,7 @@ pub const REALIZATIONS: u64 = 2000;
 /// If there are no draws at a dispersion.
 pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let mut table = MarkdownTable::new(&["plate (mm)", "dispersion", "instruction set", "digest"]);
-    for (thickness, dispersion) in BATCHES {
+    for (thickness, dispersion) in ENSEMBLES {
         for isa in Isa::available() {
             let cell = Cell::new(thickness, dispersion, &Draws { isa, ..*draws })?;
             let mut row = vec![millimetres(thickness), dispersion.to_string()];

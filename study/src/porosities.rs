@@ -28,12 +28,12 @@ pub const BONES: u64 = 500;
 /// Default number of bones of [`profiles`].
 pub const PROFILES: u64 = 100;
 /// Numbers of velocities of the data of [`coverage`].
-const COUNTS: [usize; 3] = [20, 100, 2747];
+const COVERAGE_VELOCITIES: [usize; 3] = [20, 100, 2747];
 /// Number of velocities of the data of [`profiles`].
-const COUNTED: u64 = 100;
+const PROFILE_VELOCITIES: u64 = 100;
 /// Number of velocities of the data of [`unmodelled`].
-const MANY: u64 = 4000;
-/// Truths of porosity and dispersion.
+const UNMODELLED_VELOCITIES: u64 = 4000;
+/// Intervals from which the true porosity and the true dispersion are drawn.
 const POROSITIES: [f64; 2] = [0.03, 0.25];
 const DISPERSIONS: [f64; 2] = [0.05, 0.2];
 /// Bounds of their search.
@@ -41,7 +41,7 @@ const POROSITY_BOUNDS: [f64; 2] = [0.002, 0.45];
 const DISPERSION_BOUNDS: [f64; 2] = [0.01, 0.4];
 /// Truths and bounds of the porosities at the skin's and at the marrow's side in [`profiles`].
 const ENDS: [[f64; 2]; 2] = [[0.01, 0.15], [0.02, 0.4]];
-/// Number of realizations of the model, and of one whose posterior is computed.
+/// Number of realizations of the model; the second, where a posterior is computed.
 const REALIZATIONS: u64 = 256;
 const POSTERIOR_REALIZATIONS: u64 = 64;
 /// Maximum fraction of failed realizations of the model.
@@ -65,7 +65,7 @@ const BLOCK: usize = 20;
 /// # Errors
 /// If a point has no ensemble, or an identification fails.
 pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
-    let mut counts = [[IntervalCount::default(); 2]; COUNTS.len()];
+    let mut counts = [[IntervalCount::default(); 2]; COVERAGE_VELOCITIES.len()];
     let blocks: Vec<u64> = (0..twins.repetitions).collect();
     for block in blocks.chunks(BLOCK) {
         let found: Result<Vec<_>, StudyError> =
@@ -84,9 +84,9 @@ pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTabl
         "intervals",
         "without one",
         "intervals that hold it (%)",
-        "s.d. of (found - true)/s.e.",
+        "r.m.s. of (found - true)/s.e.",
     ]);
-    for (velocities, row) in COUNTS.iter().zip(counts) {
+    for (velocities, row) in COVERAGE_VELOCITIES.iter().zip(counts) {
         for (name, count) in ["porosity", "dispersion"].into_iter().zip(row) {
             table.push([vec![velocities.to_string(), name.to_owned()], count.cells()].concat());
         }
@@ -156,7 +156,12 @@ pub fn unmodelled(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTa
         setup.layers.bone_thickness = thickness;
         let velocities = |pores: Pores| {
             let bones = Surroundings { setup: Setup { pores, ..setup }, ..Surroundings::default() };
-            bones.velocities(&matrix_point(DISPERSION), MANY, twins.seed, twins.isa)
+            bones.velocities(
+                &matrix_point(DISPERSION),
+                UNMODELLED_VELOCITIES,
+                twins.seed,
+                twins.isa,
+            )
         };
         for (ends, shape) in UNMODELLED {
             let [surface, marrow] = ends.map(Some);
@@ -220,23 +225,23 @@ impl IntervalCount {
 fn identify_bone(
     twins: &Twins,
     number: u64,
-) -> Result<Option<[[Found; 2]; COUNTS.len()]>, StudyError> {
+) -> Result<Option<[[Found; 2]; COVERAGE_VELOCITIES.len()]>, StudyError> {
     let mut generator = Generator::for_index(twins.seed, number);
     let mut draw = |[from, to]: [f64; 2]| generator.between(from, to);
     let truth = [draw(POROSITIES), draw(DISPERSIONS)];
     let mut bones = Surroundings::default();
     bones.setup.pores.porosity = Some(truth[0]);
-    let most = COUNTS.iter().max().copied().unwrap_or_default();
+    let most = COVERAGE_VELOCITIES.iter().max().copied().unwrap_or_default();
     let drawn = most as u64 + most as u64 / 20;
     let seed = data_seed(twins.seed, number);
     let velocities = bones.velocities(&matrix_point(truth[1]), drawn, seed, twins.isa)?;
     if velocities.len() < most {
         return Ok(None);
     }
-    let mut found = [[(None, 0.0); 2]; COUNTS.len()];
+    let mut found = [[(None, 0.0); 2]; COVERAGE_VELOCITIES.len()];
     // Each job has a seed of its own: the error of the model's realizations would else be the same in all.
     let model_seed = twins.seed + number;
-    for (found, count) in found.iter_mut().zip(COUNTS) {
+    for (found, count) in found.iter_mut().zip(COVERAGE_VELOCITIES) {
         let velocities = velocities[..count].to_vec();
         let identified = identify_pores(&Setup::default(), velocities, model_seed, twins.isa)?;
         *found = [0, 1].map(|k| (identified.map(|identified| identified[k]), truth[k]));
@@ -277,11 +282,11 @@ fn posterior_of_bone(twins: &Twins, number: u64) -> Result<Option<(Point, Poster
     let profile = &mut bones.setup.pores.profile;
     (profile.surface, profile.marrow) = (Some(surface), Some(marrow));
     let seed = data_seed(twins.seed, number);
-    let mut velocities = bones.velocities(&truth, 2 * COUNTED, seed, twins.isa)?;
-    if velocities.len() < COUNTED as usize {
+    let mut velocities = bones.velocities(&truth, 2 * PROFILE_VELOCITIES, seed, twins.isa)?;
+    if velocities.len() < PROFILE_VELOCITIES as usize {
         return Ok(None);
     }
-    velocities.truncate(COUNTED as usize);
+    velocities.truncate(PROFILE_VELOCITIES as usize);
     let model_seed = twins.seed + number;
     let mut job = specification(&bones.setup, velocities, POSTERIOR_REALIZATIONS, model_seed);
     let ends = [Parameter::SurfacePorosity, Parameter::MarrowPorosity];
@@ -317,7 +322,8 @@ fn holds(posterior: &Posterior, value: Quantity, level: f64, truth: f64) -> bool
     ends.is_some_and(|(lower, upper)| (lower..=upper).contains(&truth))
 }
 
-/// Returns a job whose dispersion is free, with everything but the porosity known.
+/// Returns a job in which the dispersion is free, and everything else fixed at the truth: callers free the
+/// porosities.
 fn specification(
     setup: &Setup,
     velocities: Vec<f64>,
@@ -347,7 +353,7 @@ fn specification(
     }
 }
 
-/// Returns the point of the default bone between the pores.
+/// Returns the point of the default matrix, the bone between the pores, with this dispersion.
 fn matrix_point(dispersion: f64) -> Point {
     Point::of_matrix(&BoneMatrix::default(), dispersion)
 }
@@ -372,7 +378,7 @@ mod tests {
     fn intervals_of_porosity_and_dispersion_hold_them() {
         let twins = Twins { repetitions: 4, seed: 5, isa: Isa::fastest() };
         let table = coverage(&twins, &|_| {}).unwrap();
-        assert_eq!(table.rows().len(), 2 * COUNTS.len());
+        assert_eq!(table.rows().len(), 2 * COVERAGE_VELOCITIES.len());
         for row in table.rows() {
             assert_eq!([&row[2], &row[3]], ["4", "0"], "{table}");
             assert!(row[4].parse::<f64>().unwrap() >= 75.0, "{table}");

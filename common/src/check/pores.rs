@@ -24,14 +24,14 @@ pub(super) fn pores(pores: &Pores, violations: &mut Violations) {
         (SetupQuantity::MarrowPorosity, marrow),
     ];
     for (quantity, value) in given {
-        // A job without pores leaves the key out.
+        // 0 is refused, too: a job without pores leaves the key out.
         if let Some(value) = value.filter(|_| !known_wrong(quantity.mean_key(), violations)) {
             number(quantity.mean_key(), value, Parameter::Porosity.row().accepted, violations);
         }
     }
     if pores.porosity.is_some() && (surface.is_some() || marrow.is_some()) {
-        let message = "is given together with a profile, which has porosities of its own; leave one of \
-                       them out";
+        let message = "is given together with a profile, which has porosities of its own; give one \
+                       porosity, or a profile";
         violations.add(porosity_key, message);
     }
     let (mut checked, mut default) = (pores.model, PorosityModel::default());

@@ -11,7 +11,7 @@ use super::range::range;
 use super::setup::setup as check_setup;
 use super::value::known_wrong;
 
-/// Checks the parameters that not every job has. Both bounds of each must give a valid setup, also with
+/// Checks the parameters of the setup, which not every job searches. Both bounds of each must give a valid setup, also with
 /// the quantities that are random. One is checked at a time, with the others at their starts: a rule that
 /// two of them break only together is not found here.
 pub(super) fn setup_parameters(specification: &JobSpecification, violations: &mut Violations) {

@@ -1,13 +1,13 @@
 //! Fair shares: clients share the workers evenly, whatever the number of their jobs.
 //!
 //! Shares are measured in computing time of slots. The client with the least of it is served next;
-//! a client that begins starts from the smallest share of the others, so that it neither waits nor
-//! catches up on the past.
+//! a new client is given the smallest share among the others, so that it neither waits nor catches up on the
+//! past.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Computing time received by each client with a job under way.
+/// The account of each client with a job under way.
 #[derive(Debug, Default)]
 pub(crate) struct Shares(BTreeMap<String, Share>);
 
@@ -15,6 +15,7 @@ pub(crate) struct Shares(BTreeMap<String, Share>);
 struct Share {
     /// Number of its jobs under way.
     jobs: usize,
+    /// Computing time charged, and what it was given at its start.
     used: Duration,
 }
 
@@ -44,7 +45,7 @@ impl Shares {
         self.0.get(client).map_or(0, |share| share.jobs)
     }
 
-    /// Returns the computing time that `client` has received.
+    /// Returns the computing time in the account of `client`.
     pub(crate) fn computing_time(&self, client: &str) -> Duration {
         self.0.get(client).map_or(Duration::ZERO, |share| share.used)
     }

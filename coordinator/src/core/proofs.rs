@@ -142,7 +142,9 @@ impl Proofs {
         if self.0.len() >= PROVEN_SETUPS_MAX {
             // Setups in use are touched all the time, so the least recently used one is not in use.
             let without_batches = self.0.iter().filter(|(_, proofs)| proofs.out.is_empty());
-            if let Some(oldest) = without_batches.min_by_key(|(_, it)| it.used).map(|(setup, _)| *setup) {
+            if let Some(oldest) =
+                without_batches.min_by_key(|(_, it)| it.used).map(|(setup, _)| *setup)
+            {
                 self.0.remove(&oldest);
             }
         }

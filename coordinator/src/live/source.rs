@@ -40,7 +40,7 @@ pub(crate) struct PageSource {
     messages: mpsc::Sender<Message>,
     pub(crate) store: mpsc::WeakSender<StoreCommand>,
     pub(crate) write_times: WriteTimes,
-    /// The newest overview, for all pages. Whoever needs another makes it, and the others wait.
+    /// The newest overview, for all pages. Whoever needs a newer one makes it, while the others wait.
     pub(crate) newest: Mutex<Option<Overview>>,
     streams: Arc<Semaphore>,
     readings: Limiter,
@@ -95,7 +95,7 @@ impl PageSource {
         answer_in_time(self.jobs.ask(request)).await
     }
 
-    /// Returns a page of jobs, and the last one if others follow.
+    /// Returns some rows of the list of jobs, and the last of them if others follow.
     pub(crate) async fn list(
         &self,
         shown: &Shown,

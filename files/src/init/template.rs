@@ -42,7 +42,7 @@ seed = 1
 method = "newton"
 "#;
 
-/// Returns a job file without a file of velocities.
+/// Returns the job file for a user who has given no file of velocities: it names one to be written.
 pub fn without_data() -> String {
     of_data(
         "[data]\nvelocities = \"velocities.csv\"   # a header, and a column `velocity` in m/s\n\

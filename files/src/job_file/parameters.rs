@@ -12,7 +12,7 @@ use crate::reader::{Reader, Table};
 pub(super) const KEYS: [Key; 3] = [
     Key {
         name: "start",
-        meaning: "value at which the search starts, within the bounds; for a quantity of the setup by default its value there",
+        meaning: "value at which the search starts, within the bounds; by default, of a quantity of the setup: the value in the setup",
     },
     Key { name: "bounds", meaning: "`[lower, upper]` of a free parameter" },
     Key { name: "fixed", meaning: "instead of both: the value of a parameter that is held fixed" },
@@ -52,7 +52,8 @@ fn base(reader: &mut Reader, table: &Table<'_>, setup: &Setup) -> Base {
         Base::None if setup.pores.is_any() => Base::Matrix,
         Base::Known(_) if setup.pores.is_any() => {
             let message = "names a whole bone, and with bone.porosity the parameters are those of the bone \
-                           between the pores; leave it out, and give what is known of these";
+                           between the pores; leave it out, and give those constants of it that \
+                           you know";
             reader.violations.add(table.path(MATERIAL.name), message);
             Base::Unknown
         }
@@ -114,7 +115,7 @@ fn range(reader: &mut Reader, parameters: &Table<'_>, parameter: Parameter, base
     }
 }
 
-/// Reads the range of a parameter of the setup, which has this value there.
+/// Reads the range of a parameter of the setup; `in_setup` is the value that the setup gives it.
 fn searched(
     reader: &mut Reader,
     parameters: &Table<'_>,
@@ -130,7 +131,7 @@ fn searched(
         return UNKNOWN;
     }
     if !table.has("bounds") {
-        reader.missing(&table, "bounds", "[lower, upper], between which it is searched");
+        reader.missing(&table, "bounds", "[lower, upper], the limits of the search");
     }
     let start = match table.has("start") {
         true => reader.number(&table, "start"),

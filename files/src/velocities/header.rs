@@ -12,18 +12,20 @@ use super::units::{self, NamedUnit};
 
 /// Number of records in which the header is looked for.
 const RECORDS_MAX: usize = 1000;
-/// Most columns of a table whose header is to be found.
+/// Maximum number of columns of a table whose header is to be found.
 const COLUMNS_MAX: usize = 1000;
-/// Words for a value that is missing, in lower case; others have no two letters in a row.
+/// Words for a value that is missing, in lower case. Besides these, a cell without two letters or digits in a
+/// row (`-`, `?`, `n.a.`) has no value.
 const GAPS: [&str; 12] = [
     "na", "nan", "null", "none", "nil", "missing", "nd", "inf", "div/0", "value", "false", "failed",
 ];
-/// Most different headers that are looked at.
+/// Maximum number of distinct headers that are looked at.
 const HEADERS_MAX: usize = 20;
-/// Most lines between the header and the first row: units, and rules.
+/// Maximum number of lines between the header and the first row: units, and rules.
 const BETWEEN_MAX: usize = 3;
-/// Rows whose first fields tell whether these are names that the header does not have.
-const ROW_NAMES: usize = 50;
+/// Number of rows below a header that are examined: whether they fit it, and whether their first fields are
+/// names of rows for which it has no column.
+const ROWS_EXAMINED: usize = 50;
 
 /// Names of the columns, and where their rows begin.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,32 +85,34 @@ fn names_in(text: &str, separator: Separator) -> Result<Vec<String>, Problem> {
     // A name over several lines has one blank between them.
     let one_line = |name: String| name.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut names: Vec<String> = names.into_iter().map(one_line).collect();
-    // A mark that stands alone is the name of a column of numbers.
+    // A comment mark alone in its field (`#,velocity`) is the name of a column of running numbers.
     if uncommented.len() < text.len() && names.len() > 1 && names[0].is_empty() {
         text[..text.len() - uncommented.len()].clone_into(&mut names[0]);
     }
     Ok(names)
 }
 
-/// Returns the header where the keys say that it is: in the first line that is neither empty nor a
-/// comment, if none says more.
+/// Returns the header where the keys say that it is; without such a key, in the first line that is neither
+/// empty nor a comment.
 fn given(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem> {
     // What the first line says holds for every header, however it is found.
-    let above = above_of(&content.text);
-    let named = content.separator().or(format.separator).or(above);
+    let first_line_separator = above_of(&content.text);
+    let given_separator = content.separator().or(format.separator).or(first_line_separator);
     let skipped = match format.header_line {
         Some(line) => line.saturating_sub(1),
         None => format.skip_lines.unwrap_or(0),
     };
-    let records = TextRecords::split(&content.text, named.unwrap_or_default()).skip_lines(skipped);
+    let records =
+        TextRecords::split(&content.text, given_separator.unwrap_or_default()).skip_lines(skipped);
     for record in records {
         let record = record?;
-        let is_named = format.header_line == Some(record.line);
-        let says_separator = above.is_some() && Separator::of_first_line(record.text).is_some();
-        if !is_named && (record.is_blank() || record.is_comment() || says_separator) {
+        let is_header_line = format.header_line == Some(record.line);
+        let says_separator =
+            first_line_separator.is_some() && Separator::of_first_line(record.text).is_some();
+        if !is_header_line && (record.is_blank() || record.is_comment() || says_separator) {
             continue;
         }
-        let separator = named.unwrap_or_default();
+        let separator = given_separator.unwrap_or_default();
         let located = |problem| (Some(record.line), problem);
         if format.header_line == Some(0) {
             let count = csv_fields(record.text, separator).map_err(located)?.len();
@@ -118,7 +122,7 @@ fn given(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
                 lines_above: format.skip_lines.unwrap_or(0),
                 separator,
                 names,
-                is_separator_usual: named.is_none(),
+                is_separator_usual: given_separator.is_none(),
             });
         }
         let mut header = Header {
@@ -132,7 +136,7 @@ fn given(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
             .rows(&content.text)
             .map_while(Result::ok)
             .filter(|record| !record.is_blank() && !record.is_comment())
-            .take(ROW_NAMES)
+            .take(ROWS_EXAMINED)
             .map(|record| (record, fields_of(&record, separator)))
             .collect();
         let column = format.column.as_deref().unwrap_or(COLUMN);
@@ -146,9 +150,9 @@ fn given(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
 /// Finds the header by what it says, with every separator that may be.
 fn found(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem> {
     let skipped = format.skip_lines.unwrap_or(0);
-    let above = above_of(&content.text);
-    let named = content.separator().or(format.separator).or(above);
-    let separators = named.map_or_else(|| Separator::ALL.to_vec(), |one| vec![one]);
+    let first_line_separator = above_of(&content.text);
+    let given_separator = content.separator().or(format.separator).or(first_line_separator);
+    let separators = given_separator.map_or_else(|| Separator::ALL.to_vec(), |one| vec![one]);
     let mut best = None;
     let mut fallback = None;
     let mut first_problem = None;
@@ -163,22 +167,25 @@ fn found(content: &Content, format: &CsvFormat) -> Result<Header, LocatedProblem
             keep_better(&mut fallback, score, header);
         }
     }
-    // Any line is a table of one column.
-    let is_best = best.as_ref().is_some_and(|(_, header): &(Fit, Header)| header.names.len() > 1);
-    if let (false, Some(problem)) = (is_best, first_problem) {
+    // Any text can be read as one column, which is no reason to forget the problem of another separator.
+    let has_columns =
+        best.as_ref().is_some_and(|(_, header): &(Fit, Header)| header.names.len() > 1);
+    if let (false, Some(problem)) = (has_columns, first_problem) {
         return Err(problem);
     }
     let (_, mut header) = best.or(fallback).ok_or((None, Problem::Empty))?;
     let is_usual = header.separator == Separator::default() && format.separator.is_none();
-    header.is_separator_usual = is_usual || content.separator().is_some() || above.is_some();
+    header.is_separator_usual =
+        is_usual || content.separator().is_some() || first_line_separator.is_some();
     if header.line == 0 {
         return Err((Some(header.lines_above + 1), Problem::OnlyNumbers));
     }
     Ok(header)
 }
 
-/// How well a separator makes a table of a text: by the number of rows; then rather between several columns, and
-/// by a character than by blanks; then by the number of columns.
+/// How well a separator makes a table of a text. Compared in this order: the number of rows; whether a
+/// character separates several columns (2), blanks do (1), or there is one column or a torn unit (0); the number
+/// of columns.
 type Fit = (usize, u8, usize);
 
 /// Keeps a header if it fits better.
@@ -259,11 +266,11 @@ impl<'a> Beginning<'a> {
         Ok(found.pop().map(|(_, score, header, _)| (score, header)))
     }
 
-    /// Returns the record as a header, with the places of its columns of velocities, if the next row has a
-    /// number in one of them.
+    /// Returns the record as a header, with the places of its columns of velocities, if the next row, or at
+    /// least a third of the next ones, fits it and has velocities.
     fn candidate(&self, at: usize) -> Option<(Header, Vec<usize>)> {
         let (record, _) = &self.records[at];
-        let below = &self.have_number[at + 1..self.records.len().min(at + ROW_NAMES)];
+        let below = &self.have_number[at + 1..self.records.len().min(at + ROWS_EXAMINED)];
         if self.have_number[at] || !below.contains(&true) {
             return None;
         }
@@ -273,7 +280,7 @@ impl<'a> Beginning<'a> {
         {
             return None;
         }
-        let rows: Vec<_> = self.below(at, &names).take(ROW_NAMES).collect();
+        let rows: Vec<_> = self.below(at, &names).take(ROWS_EXAMINED).collect();
         let mut header = self.header_at(at, names);
         let places = velocity_places(&header.names);
         row_names::adapt(&mut header.names, record, self.separator, &rows, &places);
@@ -333,8 +340,8 @@ impl<'a> Beginning<'a> {
         }
     }
 
-    /// Returns the header above the first row of numbers, whatever it says, and how many rows there are; the
-    /// line 0 if there is none.
+    /// Returns the header above the first row of numbers, whatever it says, and how many rows there are. If no
+    /// line is above, it is one without names in line 0.
     fn above_numbers(&self) -> Option<(usize, Header)> {
         let first = self.have_number.iter().position(|&has_number| has_number);
         let Some(first) = first else {
@@ -369,9 +376,9 @@ impl<'a> Beginning<'a> {
 /// Returns whether a cell has no value, as people and programs say it.
 pub(super) fn is_gap(cell: &str) -> bool {
     let cell = cell.to_lowercase();
-    let mut letters = cell.split(|c: char| !c.is_alphanumeric());
+    let mut words = cell.split(|c: char| !c.is_alphanumeric());
     GAPS.contains(&cell.trim_matches(|c: char| !c.is_alphanumeric()))
-        || letters.all(|word| word.chars().count() < 2)
+        || words.all(|word| word.chars().count() < 2)
 }
 
 /// Returns the places of names that are of velocities, and not only a unit.

@@ -5,7 +5,7 @@ use std::array;
 
 use osteon_common::moments::{MOMENTS, MomentMatrix, MomentVector};
 
-/// Weight of a violated equation: the minimised function is |x - start|² + |J x - b|² / `SOFTNESS`.
+/// Inverse of the weight of the equations: the minimised function is |x - start|² + |J x - b|² / `SOFTNESS`.
 /// The equations are thus met to about 1e-10 where they can be met in the box; where they cannot,
 /// their least squares outweigh the distance. With a much smaller value rounding errors spoil the
 /// latter case.
@@ -114,8 +114,8 @@ impl Dual<'_> {
     }
 }
 
-/// Solves a symmetric system of which the upper triangle is given, by elimination. Its pivots stay above
-/// zero where differences cancel.
+/// Solves a symmetric system of which the upper triangle is given, by elimination. Pivots that
+/// cancellation makes too small are raised to [`SOFTNESS`].
 fn solve(mut matrix: MomentMatrix, mut right: MomentVector) -> MomentVector {
     for i in 0..MOMENTS {
         matrix[i][i] = matrix[i][i].max(SOFTNESS);

@@ -1,7 +1,7 @@
 //! The transfer matrix of a thin slice of a plate by its Taylor series.
 //!
-//! exp(M d) of the system in [`crate::medium`] is, entry by entry, a polynomial in κ d and
-//! σ d²/stiffness with real coefficients that depend on the solid alone. They are computed once
+//! The series of exp(M d) of the system in [`crate::medium`], which ends at M^(2 `TERMS` - 1), is entry by
+//! entry a polynomial in κ d and σ d²/stiffness (below: κ and σ) with real coefficients that depend on the solid alone. They are computed once
 //! per solid; summed over σ once per frequency; what remains per wavenumber are polynomials in k.
 
 use crate::complex::Complex;
@@ -19,7 +19,7 @@ const ENTRIES: usize = 15;
 /// The same, in groups of eight.
 type Entries = [Lanes; 2];
 
-/// Coefficients of κ^m σ^j, of total order up to 2 `TERMS` - 1, at `[m * TERMS + j]`.
+/// Coefficients of κ^m σ^j, with m + 2 j ≤ 2 `TERMS` - 1, at `[m * TERMS + j]`.
 #[derive(Debug)]
 pub(crate) struct Series<const TERMS: usize>(Vec<Entries>);
 

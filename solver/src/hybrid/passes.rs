@@ -32,7 +32,7 @@ const FAILURES_MAX: usize = 3;
 /// extremum: they include the extrema with which the picking rule compares it, and a little more.
 const PACKET_PERIODS: f64 = 1.25;
 /// Fraction of a pass's change that is taken as its error: elements have a high order, and most of
-/// the kink's waves that one pass misses are resolved by the next.
+/// the waves of the pulse's kink at t = 0 that one pass misses are resolved by the next.
 const REMAINDER: f64 = 0.5;
 /// Estimated relative error of the velocity at which passes end, at refinement 1. In a thin plate
 /// it is multiplied by the thinness, since there the kink's waves decay more slowly.
@@ -135,8 +135,8 @@ impl Passes<'_> {
         over * self.setup.solver.refinement.sqrt()
     }
 
-    /// Returns the relative error of the velocity: its change, plus the effect that the scatter of
-    /// the times may have on it at the end of the array.
+    /// Returns the relative error of the velocity: its change, plus the change that the largest scatter of
+    /// the times would cause at the receiver farthest from the middle of the array.
     fn estimate(&self, change: &Change, pick: &Pick) -> f64 {
         let count = self.distances.len() as f64;
         let mean = self.distances.iter().fold(0.0, |sum, x| sum + x) / count;

@@ -1,5 +1,5 @@
-//! Decides whether the results of an evaluation may count: the majority of the hosts confirms the proofs of the
-//! workers that gave them, and the last answers of these workers are audited.
+//! Decides whether the results of an evaluation may count: the majority of the hosts confirms the proofs of all
+//! workers that contributed results, and the last answers of these workers are audited.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -47,11 +47,11 @@ pub(crate) fn unproven_attempts(state: &State, job: JobId, now: Duration) -> BTr
 /// What the results of a worker need before they count.
 enum Need {
     Nothing,
-    /// Its proof, or the votes of others.
+    /// Its proof, or votes of other hosts, that are on their way.
     Votes,
-    /// The worker has to be asked for its proof.
+    /// Its proof, for which it has not been asked.
     Proof(WorkerId),
-    /// It cannot give its proof any more.
+    /// It cannot give its proof any more: its last answer is audited instead, which the evaluation waits for.
     Audit,
 }
 

@@ -10,7 +10,7 @@ use crate::core::reactor::turn::Turn;
 use crate::core::service_order::ServicePlace;
 use crate::core::state::State;
 
-/// Sends each otherwise idle worker a duplicate of a late batch, starting with the batch that has
+/// Sends each worker that holds no batches but speculative ones a duplicate of a late batch, starting with the batch that has
 /// been out longest.
 pub(crate) fn duplicate_late_batches(turn: &mut Turn) {
     let now = turn.now;
@@ -28,7 +28,7 @@ pub(crate) fn duplicate_slow_batches(turn: &mut Turn) {
 
 /// Sends each worker that is `idle` a duplicate of the batch that has been out longest among those
 /// `worth` it. Young batches are not duplicated, because they are about to be answered: those out for
-/// less than half the target time, and longer if all answers are late.
+/// less than half the target time and twice the mean delay of answers.
 fn duplicate(
     turn: &mut Turn,
     idle: impl Fn(&ServicePlace) -> bool,
@@ -43,17 +43,19 @@ fn duplicate(
         }
         // The worker that holds least comes first, and its duplicate makes it busy.
         let first = state.order.iter().next();
-        let sound = |place: &ServicePlace| {
+        let answers = |place: &ServicePlace| {
             state.workers.get(&place.worker).is_some_and(|worker| !state.may_be_silent(worker))
         };
         let Some(idle) = first.filter(|place| !place.on_probation && idle(place)) else {
             return;
         };
-        let is_sound = sound(&idle);
+        let surely_answers = answers(&idle);
         // This walks over all batches, so it is done only when a worker is idle. A batch with duplicates
-        // is out at workers that may be silent; only one that surely answers gets a further copy.
+        // is out at workers that may be silent; only a worker that surely answers gets a further copy.
         let is_worth = |(_, batch): &(BatchId, &Batch)| {
-            is_old(batch, now) && worth(state, batch) && (is_sound || batch.duplicates.is_empty())
+            is_old(batch, now)
+                && worth(state, batch)
+                && (surely_answers || batch.duplicates.is_empty())
         };
         let Some((slowest, _)) = open_batches(state).find(is_worth) else {
             return;

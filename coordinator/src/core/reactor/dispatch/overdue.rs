@@ -25,7 +25,8 @@ use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, State};
 use crate::core::worker_name::WorkerName;
 
-/// Lists the overdue batches, and acts on those that nobody else can answer.
+/// Lists the overdue batches that wait for a duplicate, puts workers that hold one for too long on probation,
+/// and gives up audits that nobody else can answer.
 pub(crate) fn tick(turn: &mut Turn) {
     if turn.state.probation.forget(turn.now) {
         follow_probation(turn.state);
@@ -210,9 +211,10 @@ fn choose_exclusive_worker(state: &State, id: BatchId, now: Duration) -> Option<
             let reputation = poison::reputation(state, worker, crashes);
             (reputation, is_of_holder(state, id, worker), state.batches_held(worker), **other)
         };
-    let risks_failing = risks_failing(state, batch, crashes, now);
+    let may_use_failing_host = may_use_failing_host(state, batch, crashes, now);
     let fit = |worker: &AttachedWorker| {
-        is_fit(state, id, worker, now) && (risks_failing || !state.is_failing(worker.name.host()))
+        is_fit(state, id, worker, now)
+            && (may_use_failing_host || !state.is_failing(worker.name.host()))
     };
     let fit = state.workers.iter().filter(|(_, worker)| fit(worker));
     fit.min_by_key(rank).map(|(chosen, _)| *chosen)
@@ -220,17 +222,17 @@ fn choose_exclusive_worker(state: &State, id: BatchId, now: Duration) -> Option<
 
 /// Returns whether an exclusive batch may go to a host whose workers are lost whatever they hold. It may
 /// once the holder has had the time of a lease to answer, because the holder's host may be even worse.
-/// Each loss since then doubles the wait. The last loss, which would make the realization poison, is not
+/// Each loss since the batch was begun doubles the wait. The last loss, which would make the realization poison, is not
 /// risked here, so that a bad node does not fail a job because another one is silent.
-fn risks_failing(state: &State, batch: &Batch, crashes: &Crashes, now: Duration) -> bool {
+fn may_use_failing_host(state: &State, batch: &Batch, crashes: &Crashes, now: Duration) -> bool {
     let lost = crashes.count_after(batch.begun);
     let since = crashes.last().unwrap_or_default().max(batch.begun);
     let wait = state.config.expiry * 2_u32.saturating_pow(u32::try_from(lost).unwrap_or(u32::MAX));
     now.saturating_sub(since) >= wait && !crashes.permit_only_one_more()
 }
 
-/// Returns whether a worker may get a duplicate of a batch: it is eligible, and holds no overdue batch
-/// itself.
+/// Returns whether a worker may get a duplicate of a batch: it is eligible ([`may_have`]), sound or to be
+/// tried, and holds no overdue batch itself.
 fn is_fit(state: &State, id: BatchId, worker: &AttachedWorker, now: Duration) -> bool {
     let has_overdue = || worker.in_flight.iter().any(|held| is_overdue(state, *held, now));
     let trusted = state.is_sound(worker) || may_be_tried(state, id, worker, now);
