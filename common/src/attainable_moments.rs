@@ -101,7 +101,7 @@ fn scatter_of_velocity(
     let of_quantity = |quantity: SetupQuantity| {
         let mean = quantity.value_in(setup)?;
         let [low, high] = random.scatter(quantity).about(mean);
-        let at = |value| velocities(ranges, &quantity.with(value, *setup));
+        let at = |value| velocities(ranges, &quantity.with(value, setup.clone()));
         let (below, above) = (at(low), at(high));
         let relative = |below: f64, above: f64| ((above - below) / (above + below)).abs();
         let ends = [relative(below.0, above.0), relative(below.1, above.1)];

@@ -11,7 +11,7 @@ pub use crate::bone::Bone;
 
 /// Everything but the bone's material: the part that all realizations of a job share, and the only
 /// part on which a solver's shared tables may depend.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Setup {
     /// The stack of layers.
     pub layers: Layers,

@@ -228,7 +228,7 @@ impl JobSpecification {
     /// Returns the specification of the search for set number `set` of the data, without data.
     #[must_use]
     pub fn of_set(&self, set: usize) -> Self {
-        Self { data: None, parameters: self.ranges_of(set), ..*self }
+        Self { data: None, parameters: self.ranges_of(set), ..self.clone() }
     }
 
     /// Returns the parameters that are searched.

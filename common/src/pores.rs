@@ -47,7 +47,7 @@ pub struct PorosityProfile {
 }
 
 /// The pores of the bone; without any porosity there are none.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pores {
     /// The porosity, if it is the same through the thickness.
     pub porosity: Option<f64>,

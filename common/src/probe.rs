@@ -52,7 +52,7 @@ impl Receivers {
 }
 
 /// The probe and its pulse, by default F(t) = amplitude · sin(2π fc t) · exp(-4 (fc t - 1)²), t ≥ 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
     /// Centre frequency fc of the pulse, Hz.
     pub center_frequency: f64,
@@ -136,7 +136,7 @@ impl Probe {
         let rise = apart * libm::sin(self.tilt);
         let source = Source { x3: self.source.x3 + rise, ..self.source };
         let receivers = Receivers { x3: self.receivers.x3 + rise, ..self.receivers };
-        Self { source, receivers, tilt: -self.tilt, ..*self }
+        Self { source, receivers, tilt: -self.tilt, ..self.clone() }
     }
 }
 

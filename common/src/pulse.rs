@@ -53,7 +53,7 @@ impl PulseShape {
 }
 
 /// The form of a pulse: everything about it but centre frequency and amplitude.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PulseForm {
     /// The shape.
     pub shape: PulseShape,

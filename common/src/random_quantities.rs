@@ -139,7 +139,7 @@ impl RandomQuantities {
             // The checks require a mean.
             None => setup,
         };
-        self.random().fold(*setup, drawn)
+        self.random().fold(setup.clone(), drawn)
     }
 }
 

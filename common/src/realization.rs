@@ -67,7 +67,7 @@ pub fn mean_bone(point: &Point, setup: &Setup) -> Result<CaseBone, NoPorousBone>
 impl Realization {
     /// Returns it as a case, whose setup is `given` unless it has its own.
     pub fn into_case(self, given: &Setup) -> Case {
-        Case { setup: self.own_setup.unwrap_or(*given), bone: self.bone }
+        Case { setup: self.own_setup.unwrap_or_else(|| given.clone()), bone: self.bone }
     }
 }
 
@@ -109,7 +109,7 @@ impl Ensemble {
 
     /// Returns the setup of the realization at `index`, given that of the job.
     pub fn setup(&self, index: u64, setup: &Setup) -> Setup {
-        self.own_setup(index, setup).unwrap_or(*setup)
+        self.own_setup(index, setup).unwrap_or_else(|| setup.clone())
     }
 
     /// Returns the realization at `index`, given the setup of the job or that of its point.

@@ -143,6 +143,6 @@ impl Point {
             Some(quantity) => quantity.with(value, setup),
             None => setup,
         };
-        self.given().fold(*setup, with)
+        self.given().fold(setup.clone(), with)
     }
 }

@@ -110,7 +110,7 @@ impl Warnings {
     }
 
     fn setup(&mut self, setup: &Setup) {
-        let mut setup = *setup;
+        let mut setup = setup.clone();
         for (key, section) in setup.sections() {
             self.entries(key.name, &fields::entries(section));
         }

@@ -158,7 +158,7 @@ fn of_tree(
     let (search, cost_tolerance_omitted) = search(&mut reader, &table);
     let specification = JobSpecification {
         kind,
-        setup,
+        setup: setup.clone(),
         data,
         parameters: parameters::read(&mut reader, &table, &setup),
         random: random(&mut reader, &table),

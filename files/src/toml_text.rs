@@ -69,7 +69,7 @@ fn written(write: impl FnOnce(&mut String) -> fmt::Result) -> String {
 
 /// Writes the sections of a setup without the keys with these paths.
 fn setup(out: &mut String, setup: &Setup, left_out: &[&str]) -> fmt::Result {
-    let mut setup = *setup;
+    let mut setup = setup.clone();
     for (index, (key, declared)) in setup.sections().into_iter().enumerate() {
         if index > 0 {
             writeln!(out)?;

@@ -33,7 +33,7 @@ const GROUPS_LISTED_MAX: usize = 5;
 pub fn out_of_reach(specification: &JobSpecification) -> Vec<String> {
     let Some(data) = &specification.data else { return Vec::new() };
     let solver = SolverSettings::default();
-    let setup = Setup { solver, ..specification.setup };
+    let setup = Setup { solver, ..specification.setup.clone() };
     if specification.kind != JobKind::Identification || pair_count(&setup) > PAIRS_MAX {
         return Vec::new();
     }
@@ -206,7 +206,7 @@ fn scatter_at_start(specification: &JobSpecification, setup: &Setup) -> f64 {
     let of_quantity = |quantity: SetupQuantity| {
         let ends = random.scatter(quantity).about(quantity.value_in(&setup)?);
         let mut velocity = |value| {
-            let setup = quantity.with(value, setup);
+            let setup = quantity.with(value, setup.clone());
             let (solver, bone) = (Solver::new(&setup), mean_bone(&start, &setup).ok()?);
             solver.arrival(&bone, &mut workspace).ok().map(|arrival| arrival.velocity)
         };

@@ -33,7 +33,7 @@ impl SolvedCase {
         let signal = |arrival| solver.first_signal(&case.bone, arrival, &mut workspace);
         let first_signal = arrival.as_ref().ok().map(signal);
         let guided_waves = solver.guided_waves(&case.bone);
-        Self { setup: case.setup, arrival, first_signal, guided_waves, check: None }
+        Self { setup: case.setup.clone(), arrival, first_signal, guided_waves, check: None }
     }
 
     /// Returns the object `solver` of the result.

@@ -19,7 +19,7 @@ use crate::v1;
 
 /// The part that all batches of one evaluation have in common. With it, an index determines a
 /// realization.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct EvaluationInput {
     /// Number of the evaluation, unique for the life of the coordinator.
     pub id: u64,

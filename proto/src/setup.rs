@@ -28,7 +28,7 @@ pub struct SetupMessages {
 
 /// Returns the complete messages of a setup: every field is present.
 pub fn to_messages(setup: &Setup) -> SetupMessages {
-    let mut setup = *setup;
+    let mut setup = setup.clone();
     SetupMessages {
         layers: fields::to_message(&mut setup.layers),
         probe: fields::to_message(&mut setup.probe),

@@ -65,7 +65,7 @@ fn check_specification(bytes: &[u8]) {
 
 /// The evaluation at the start of a job.
 fn evaluation_of(job: &JobSpecification) -> evaluation::EvaluationInput {
-    let (setup, point, germs) = (job.setup, job.start(), job.monte_carlo.germs());
+    let (setup, point, germs) = (job.setup.clone(), job.start(), job.monte_carlo.germs());
     let observables = job.observables();
     evaluation::EvaluationInput { id: 7, setup, point, germs, random: job.random, observables }
 }

@@ -95,7 +95,7 @@ impl PyCase {
         let elasticity = Elasticity::new(tensor)
             .map_err(|error| errors::bad_input("tensor", error.to_string()))?;
         let bone = Bone { density: density_of(density, "density")?, elasticity };
-        Ok(Self { case: Case { setup: self.case.setup, bone: bone.into() } })
+        Ok(Self { case: Case { setup: self.case.setup.clone(), bone: bone.into() } })
     }
 
     fn __eq__(&self, other: &Self) -> bool {

@@ -88,7 +88,7 @@ impl PyJob {
         let ensemble = specification
             .ensemble(&specification.start())
             .map_err(|error| errors::bad_input("parameters", error.to_string()))?;
-        PyEnsemble::of_job(ensemble, specification.setup)
+        PyEnsemble::of_job(ensemble, specification.setup.clone())
     }
 
     /// Copies and pickles it as its complete job file.

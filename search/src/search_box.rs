@@ -7,7 +7,7 @@ use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Parameter, Point};
 use osteon_common::pores::Pores;
 
 /// The ranges within which a search moves.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SearchBox {
     ranges: [Range; PARAMETERS],
     pores: Pores,
@@ -61,7 +61,7 @@ impl SearchBox {
     pub fn started_at(&self, coordinates: &[f64]) -> Self {
         let mut coordinates = coordinates.iter();
         Self {
-            pores: self.pores,
+            pores: self.pores.clone(),
             ranges: self.ranges.map(|range| match range {
                 Range::Fixed(_) => range,
                 Range::Free { lower, upper, start } => match coordinates.next() {

@@ -43,7 +43,7 @@ impl Check {
     pub fn run(case: &Case, isa: Isa) -> Self {
         let mut workspace = Workspace::default();
         let mut solve = |solver| {
-            let setup = Setup { solver, ..case.setup };
+            let setup = Setup { solver, ..case.setup.clone() };
             let arrival = Solver::with_isa(&setup, isa).arrival(&case.bone, &mut workspace);
             (setup, arrival)
         };

@@ -102,7 +102,7 @@ impl Exact {
 
     /// Returns the method for another setup with the same tables ([`has_tables_of`]), which it shares.
     pub(crate) fn with_setup(&self, setup: &Setup) -> Self {
-        let prepared = PreparedSetup { setup: *setup, ..self.prepared.clone() };
+        let prepared = PreparedSetup { setup: setup.clone(), ..self.prepared.clone() };
         Self { prepared, ..self.clone() }
     }
 
@@ -163,9 +163,9 @@ impl Exact {
 /// Returns whether two setups have the same tables. Tables describe coupling, marrow, probe and
 /// sampling, not what is picked; the bone's thickness matters only by the band that a thin plate needs.
 pub(crate) fn has_tables_of(setup: &Setup, other: &Setup) -> bool {
-    let mut alike = *setup;
+    let mut alike = setup.clone();
     alike.layers.bone_thickness = other.layers.bone_thickness;
     alike.picking = other.picking;
-    alike.pores = other.pores;
+    alike.pores = other.pores.clone();
     alike == *other && sampling::thinness(setup).to_bits() == sampling::thinness(other).to_bits()
 }

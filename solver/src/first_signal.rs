@@ -159,7 +159,7 @@ impl Solver {
     ) -> Result<Arrival, Failure> {
         let setup = self.setup();
         let picking = Picking { extremum: setup.picking.extremum.other(), ..setup.picking };
-        self.with_setup(&Setup { picking, ..*setup }).arrival(bone, workspace)
+        self.with_setup(&Setup { picking, ..setup.clone() }).arrival(bone, workspace)
     }
 
     /// Returns the decay of an arrival along the array, dB/cm.

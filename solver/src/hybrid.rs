@@ -84,7 +84,7 @@ impl Hybrid {
 
     /// Creates a solver that computes on `isa`. The bits of its results do not depend on the instruction set.
     pub fn with_isa(setup: &Setup, isa: Isa) -> Self {
-        Self { setup: *setup, distances: setup.probe.distances().collect(), isa }
+        Self { setup: setup.clone(), distances: setup.probe.distances().collect(), isa }
     }
 
     /// Returns the setup.

@@ -28,7 +28,7 @@ const RICKER_EXTENT: f64 = 2.95;
 const BISECTIONS: u32 = 40;
 
 /// The pulse of one probe.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Pulse {
     amplitude: f64,
     center_frequency: f64,
@@ -38,7 +38,7 @@ pub(crate) struct Pulse {
 impl Pulse {
     /// Creates the pulse of a probe, but with this amplitude.
     pub(crate) fn new(amplitude: f64, probe: &Probe) -> Self {
-        Self { amplitude, center_frequency: probe.center_frequency, form: probe.pulse }
+        Self { amplitude, center_frequency: probe.center_frequency, form: probe.pulse.clone() }
     }
 
     /// Time after which the pulse is over, s.
@@ -146,7 +146,9 @@ impl Pulse {
 pub(crate) fn relative_onset(probe: &Probe) -> f64 {
     let of = |form: PulseForm| Pulse { amplitude: 1.0, center_frequency: 1.0, form }.onset();
     match probe.pulse.tone_cycles() {
-        Some(cycles) if cycles > 2.0 => (of(probe.pulse) / of(PulseForm::default())).min(1.0),
+        Some(cycles) if cycles > 2.0 => {
+            (of(probe.pulse.clone()) / of(PulseForm::default())).min(1.0)
+        }
         _ => 1.0,
     }
 }
@@ -256,7 +258,7 @@ mod tests {
         assert_eq!((tone.length(), tone.extent()), (paper.length(), paper.extent()));
         for t in (0..400).map(|i| f64::from(i) * 11e-9) {
             let of = |pulse: Pulse| [pulse.at(t), pulse.slope_at(t)].map(f64::to_bits);
-            assert_eq!(of(tone), of(paper), "{t}");
+            assert_eq!(of(tone.clone()), of(paper.clone()), "{t}");
         }
     }
 

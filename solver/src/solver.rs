@@ -47,11 +47,11 @@ impl Solver {
         let memory = Arc::new(TableMemory::default());
         let probe = &setup.probe;
         let reversed = (probe.bidirectional && probe.tilt != 0.0).then(|| {
-            let reversed = Setup { probe: probe.from_other_side(), ..*setup };
+            let reversed = Setup { probe: probe.from_other_side(), ..setup.clone() };
             Exact::new(&reversed, isa, &memory)
         });
         Self {
-            setup: *setup,
+            setup: setup.clone(),
             isa,
             exact: Exact::new(setup, isa, &memory),
             reversed,
@@ -77,10 +77,10 @@ impl Solver {
             return None;
         }
         let reversed = self.reversed.as_ref().map(|exact| {
-            exact.with_setup(&Setup { probe: setup.probe.from_other_side(), ..*setup })
+            exact.with_setup(&Setup { probe: setup.probe.from_other_side(), ..setup.clone() })
         });
         Some(Self {
-            setup: *setup,
+            setup: setup.clone(),
             isa: self.isa,
             exact: self.exact.with_setup(setup),
             reversed,

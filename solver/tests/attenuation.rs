@@ -79,7 +79,7 @@ fn attenuated_errors_are_within_what_is_stated() {
         setup.layers.bone_attenuation = quality(bone);
         setup.layers.coupling.attenuation = quality(coupling);
         setup.layers.marrow.attenuation = quality(marrow);
-        let mut refined = setup;
+        let mut refined = setup.clone();
         refined.solver.refinement = 3.0;
         for index in 0..6 {
             let bone = ensemble.bone(index).unwrap();

@@ -31,7 +31,7 @@ fn arrival<'a>(setup: &Setup, bone: impl Into<BoneRef<'a>>) -> Arrival {
 }
 
 fn hybrid<'a>(setup: &Setup, bone: impl Into<BoneRef<'a>>) -> Arrival {
-    let mut setup = *setup;
+    let mut setup = setup.clone();
     setup.solver.method = Method::Hybrid;
     Hybrid::new(&setup).arrival(bone, &mut HybridWorkspace::default()).unwrap()
 }
@@ -55,7 +55,7 @@ const CHANGES: [(&str, Change); 4] = [
 
 /// Replaces both fluids by sublayers of these shares of their thickness, each second one denser by `denser`.
 fn divided(setup: &Setup, shares: &[f64], denser: f64) -> Setup {
-    let mut new = *setup;
+    let mut new = setup.clone();
     for fluid in [&mut new.layers.coupling, &mut new.layers.marrow] {
         let (whole, density, speed) = (fluid.thickness, fluid.density, fluid.sound_speed);
         let each = |(i, share): (usize, &f64)| {
@@ -168,7 +168,7 @@ fn a_thin_heavy_sublayer_vanishes() {
                 all.insert(place, thin);
                 FluidSublayers::new(&all).unwrap()
             };
-            let mut changed = setup;
+            let mut changed = setup.clone();
             changed.layers.coupling.sublayers = with(&above);
             changed.layers.marrow.sublayers = with(&below);
             arrival(&changed, &bone).velocity / expected - 1.0
@@ -208,7 +208,7 @@ fn tilted_receivers_hear_what_level_ones_do() {
     setup.probe.source.x3 = 2e-3;
     setup.probe.receivers.x3 = 0.5e-3;
     let level = |setup: &Setup, place: Place| {
-        let mut level = *setup;
+        let mut level = setup.clone();
         level.probe.tilt = 0.0;
         level.probe.receivers.x3 = place.x3;
         level.probe.receivers.first_x1 = place.x;

@@ -78,7 +78,7 @@ fn reference_cases() {
 /// The hybrid method and the refined exact one tell the same of a bone.
 fn check_agreement<'a>(setup: &Setup, bone: impl Into<BoneRef<'a>>, relative: f64, what: &str) {
     let bone = bone.into();
-    let mut refined = *setup;
+    let mut refined = setup.clone();
     refined.solver.method = Method::Exact;
     refined.solver.refinement = 5.0;
     let exact = Solver::new(&refined).arrival(bone, &mut Workspace::default());

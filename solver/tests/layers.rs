@@ -49,7 +49,7 @@ fn arrival<'a>(setup: &Setup, bone: impl Into<BoneRef<'a>>) -> Arrival {
 
 /// Returns the setup with the thickness of these sublayers.
 fn with_thickness(setup: &Setup, sublayers: &Sublayers) -> Setup {
-    let mut setup = *setup;
+    let mut setup = setup.clone();
     setup.layers.bone_thickness = sublayers.thickness();
     setup
 }

@@ -23,7 +23,7 @@ fn setup(shape: PulseShape, cycles: f64, element_width: f64) -> Setup {
 }
 
 fn arrival(setup: &Setup, method: Method, refinement: f64, bone: &Bone) -> Arrival {
-    let mut setup = *setup;
+    let mut setup = setup.clone();
     (setup.solver.method, setup.solver.refinement) = (method, refinement);
     Solver::new(&setup).arrival(bone, &mut Workspace::default()).unwrap()
 }
@@ -84,7 +84,7 @@ fn traces_of_wide_elements_are_means_over_lines() {
     let found = traces(&wide);
     let mut mean = vec![vec![0.0; found[0].len()]; 3];
     for (difference, weight) in differences() {
-        let mut lines = wide;
+        let mut lines = wide.clone();
         lines.probe.element_width = 0.0;
         lines.probe.receivers.first_x1 += difference;
         for (mean, trace) in mean.iter_mut().zip(traces(&lines)) {

@@ -70,7 +70,7 @@ fn check(quantity: SetupQuantity, setup: &Setup, deviation: f64, tolerance: f64)
         SetupQuantity::MarrowPorosity => random.marrow_porosity = scatter,
     }
     let mean = quantity.value_in(setup).unwrap();
-    let expected = by_quadrature(|node| quantity.with(mean + node * deviation, *setup));
+    let expected = by_quadrature(|node| quantity.with(mean + node * deviation, setup.clone()));
     let found = by_realizations(setup, random);
     let off = found.mean / expected.mean - 1.0;
     let ratio = found.coefficient_of_variation / expected.coefficient_of_variation - 1.0;
@@ -87,7 +87,7 @@ fn moments_over_random_setups_are_those_of_quadrature_over_fixed_ones() {
     check(SetupQuantity::BoneThickness, &setup, 0.2e-3, 1e-5);
     // It does so little that the errors of refinement 1 would be seen.
     let solver = SolverSettings { refinement: 2.0, ..setup.solver };
-    let refined = Setup { solver, ..setup };
+    let refined = Setup { solver, ..setup.clone() };
     check(SetupQuantity::CouplingSoundSpeed, &refined, 20.0, 1e-6);
     // One degree: 4.3 % in one direction.
     check(SetupQuantity::ProbeTilt, &setup, 0.017_45, 1e-5);

@@ -140,7 +140,7 @@ fn the_second_extremum_and_the_frequency_are_those_of_the_references() {
         let frequency = 0.5 / mean(half);
         let (mut workspace, mut signals) = (Workspace::default(), Vec::new());
         for extremum in [Extremum::First, Extremum::Second] {
-            let mut setup = reference.setup;
+            let mut setup = reference.setup.clone();
             setup.picking.extremum = extremum;
             let solver = Solver::new(&setup);
             let arrival = solver.arrival(&reference.bone, &mut workspace).unwrap();
@@ -173,7 +173,7 @@ fn the_decay_is_that_of_the_reference_traces() {
         .map(|line| line.split(',').map(|field| field.parse().unwrap()).collect())
         .collect();
     for extremum in [Extremum::First, Extremum::Second] {
-        let mut setup = reference.setup;
+        let mut setup = reference.setup.clone();
         setup.picking.extremum = extremum;
         let times = match extremum {
             Extremum::First => &reference.times,

@@ -32,7 +32,7 @@ fn tilted_setup(tilt: f64) -> Setup {
 
 /// Returns a level probe whose first receiver is at a place.
 fn level(setup: &Setup, place: Place) -> Setup {
-    let mut level = *setup;
+    let mut level = setup.clone();
     level.probe.tilt = 0.0;
     level.probe.bidirectional = false;
     level.probe.receivers.x3 = place.x3;
@@ -101,7 +101,7 @@ fn the_second_direction_is_that_of_exchanged_source_and_receivers() {
     let both = arrival(&setup, &bone);
     let [one, two] = both.directions.unwrap();
     let other = setup.probe.from_other_side();
-    let reversed = Setup { probe: other, ..setup };
+    let reversed = Setup { probe: other.clone(), ..setup };
     let times = arrival(&one_way(&reversed), &bone).times;
     let heights: Vec<f64> = setup.probe.places().map(|place| place.x3).collect();
     let places: Vec<Place> = other.places().collect();
@@ -119,7 +119,7 @@ fn the_second_direction_is_that_of_exchanged_source_and_receivers() {
 }
 
 fn one_way(setup: &Setup) -> Setup {
-    let mut setup = *setup;
+    let mut setup = setup.clone();
     setup.probe.bidirectional = false;
     setup
 }

@@ -33,7 +33,7 @@ pub(super) async fn simulate(arguments: SimulateArguments, isa: Isa) -> Ended {
     let case = case_file::of_input(&input).map_err(CommandFailure::bad_input)?;
     warnings::say_all(&case_warnings(&case));
     let traces = arguments.out.as_ref().map(|directory| directory.join(TRACES));
-    let setup = case.setup;
+    let setup = case.setup.clone();
     let (report, out) = (arguments.report.clone(), arguments.out.clone());
     let solved = tokio::task::spawn_blocking(move || solve(&case, &arguments, isa));
     let solved = said_while(solved, &setup).await.map_err(CommandFailure::failed)??;

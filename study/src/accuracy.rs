@@ -63,9 +63,9 @@ impl Both {
     pub(crate) fn new(setup: &Setup, isa: Isa) -> Self {
         let [default, reference] = [1.0, REFERENCE].map(|refinement| {
             let solver = SolverSettings { refinement, ..setup.solver };
-            Solver::with_isa(&Setup { solver, ..*setup }, isa)
+            Solver::with_isa(&Setup { solver, ..setup.clone() }, isa)
         });
-        Self { setup: *setup, default, reference }
+        Self { setup: setup.clone(), default, reference }
     }
 
     pub(crate) fn measure(

@@ -19,7 +19,7 @@ use crate::draws::solve_realizations;
 pub(crate) type RealizationCache = BTreeMap<[u64; PARAMETERS], Vec<RealizationResult>>;
 
 /// Layers and probe, and how they differ from realization to realization.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Surroundings {
     /// The setup, with the means.
     pub(crate) setup: Setup,

@@ -155,7 +155,8 @@ pub fn unmodelled(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTa
         let mut setup = Setup::default();
         setup.layers.bone_thickness = thickness;
         let velocities = |pores: Pores| {
-            let bones = Surroundings { setup: Setup { pores, ..setup }, ..Surroundings::default() };
+            let bones =
+                Surroundings { setup: Setup { pores, ..setup.clone() }, ..Surroundings::default() };
             bones.velocities(
                 &matrix_point(DISPERSION),
                 UNMODELLED_VELOCITIES,
@@ -335,7 +336,7 @@ fn specification(
     parameters[Parameter::Dispersion as usize] = free(DISPERSION_BOUNDS, point.dispersion());
     JobSpecification {
         kind: JobKind::Identification,
-        setup: *setup,
+        setup: setup.clone(),
         data: Some(Data::from_velocities(velocities)),
         parameters,
         random: RandomQuantities::default(),

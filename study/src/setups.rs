@@ -168,7 +168,7 @@ impl MeasuredSetup {
     fn new(index: u64, drawn: Drawn, isa: Isa, workspace: &mut Workspace) -> Self {
         let [found, reference] = [1.0, REFERENCE].map(|refinement| {
             let solver = SolverSettings { refinement, ..drawn.setup.solver };
-            let setup = Setup { solver, ..drawn.setup };
+            let setup = Setup { solver, ..drawn.setup.clone() };
             Solver::with_isa(&setup, isa).arrival(&drawn.bone, workspace)
         });
         let difference = difference(&drawn.setup, &found, &reference);
@@ -281,7 +281,7 @@ fn is_suitable(setup: &Setup) -> bool {
     let mut violations = Violations::new();
     check::setup(setup, &mut violations);
     let solver = SolverSettings { refinement: REFERENCE, ..setup.solver };
-    let refined = Setup { solver, ..*setup };
+    let refined = Setup { solver, ..setup.clone() };
     violations.is_empty() && pair_count(setup) <= PAIRS_MAX.0 && pair_count(&refined) <= PAIRS_MAX.1
 }
 

@@ -122,7 +122,7 @@ pub fn populations(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownT
     let columns: Vec<&str> = [&["the model's laws"], &COUNTED_COLUMNS[..]].concat();
     let mut table = MarkdownTable::new(&columns);
     let population = population();
-    let means = Surroundings { random: RandomQuantities::default(), ..population };
+    let means = Surroundings { random: RandomQuantities::default(), ..population.clone() };
     for (model, name) in [(&population, "those of the data"), (&means, "none")] {
         let counts = Counts::count_over_data_sets(twins, &population, model, progress)?;
         for row in counts.rows() {
@@ -218,7 +218,7 @@ fn two_parameter_specification(
     let mut specification = specification(&OPTIMUM, searched, velocities, seed);
     specification.parameters[searched as usize] = free(searched, 19e9);
     specification.parameters[Parameter::Dispersion as usize] = free(Parameter::Dispersion, 0.12);
-    let &Surroundings { setup, random } = model;
+    let Surroundings { setup, random } = model.clone();
     JobSpecification { setup, random, ..specification }
 }
 

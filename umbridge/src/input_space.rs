@@ -120,7 +120,8 @@ impl<'a> InputSpace<'a> {
         let mut monte_carlo = self.specification.monte_carlo;
         monte_carlo.seed = seed.unwrap_or(monte_carlo.seed);
         monte_carlo.realizations = realizations.unwrap_or(monte_carlo.realizations);
-        let (mut setup, mut parameters) = (self.specification.setup, self.specification.parameters);
+        let (mut setup, mut parameters) =
+            (self.specification.setup.clone(), self.specification.parameters);
         for parameter in Parameter::ALL {
             let value = point.get(parameter);
             let range = &mut parameters[parameter as usize];

@@ -78,7 +78,7 @@ fn values(
     }
     // Set directly and not through a `Point`, in which a known 0 would stand for the setup's value.
     let with = |setup: Setup, (parameter, value): (Parameter, f64)| {
-        parameter.of_setup().map_or(setup, |quantity| quantity.with(value, setup))
+        parameter.of_setup().map_or(setup.clone(), |quantity| quantity.with(value, setup))
     };
     let setup = group.known.given().fold(specification.start().setup(&specification.setup), with);
     let refused = Violations::first_of(|found| {

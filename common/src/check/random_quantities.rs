@@ -54,7 +54,7 @@ fn extent(
     let Some(deviation) = scatter.standard_deviation else { return };
     let mut ends = scatter.extent(mean).into_iter();
     let refused =
-        |end| Violations::first_of(|found| check_setup(&quantity.with(end, *setup), found));
+        |end| Violations::first_of(|found| check_setup(&quantity.with(end, setup.clone()), found));
     if let Some(refused) = ends.find_map(refused) {
         let hint = match scatter.distribution {
             RandomDistribution::Normal if mean > 0.0 => {

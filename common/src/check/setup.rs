@@ -15,7 +15,7 @@ use super::value::{known_wrong, quantity};
 
 /// Records all violations of `setup`.
 pub fn setup(setup: &Setup, violations: &mut Violations) {
-    let (mut checked, mut default) = (*setup, Setup::default());
+    let (mut checked, mut default) = (setup.clone(), Setup::default());
     for ((key, declared), (_, default)) in checked.sections().into_iter().zip(default.sections()) {
         if key.name == "probe" {
             // The range of the heights is narrower than that of their keys.
@@ -130,7 +130,7 @@ fn tilted(setup: &Setup, violations: &mut Violations) {
     }
     let top = setup.layers.coupling.whole_thickness();
     let other_side = probe.bidirectional.then(|| probe.from_other_side());
-    for probe in [*probe].into_iter().chain(other_side) {
+    for probe in [probe.clone()].into_iter().chain(other_side) {
         let heights = || probe.places().map(|place| place.x3).chain([probe.source.x3]);
         // Elements reach up and down by half their extent.
         let reach = 0.5 * probe.element_extent().1.abs();

@@ -49,7 +49,7 @@ pub(super) fn random_setup(specification: &JobSpecification, violations: &mut Vi
         violations.has_at_or_below(&format!("parameters.{}", parameter.name()))
     };
     let means = match Parameter::OF_SETUP.into_iter().any(is_wrong) {
-        true => *setup,
+        true => setup.clone(),
         false => specification.start().setup(setup),
     };
     random_quantities(random, &means, violations);
@@ -65,7 +65,7 @@ fn ends(
 ) {
     let setup = specification.start().setup(&specification.setup);
     let refused = |bound| {
-        let at_bound = quantity.with(bound, setup);
+        let at_bound = quantity.with(bound, setup.clone());
         let violation = Violations::first_of(|found| {
             check_setup(&at_bound, found);
             random_quantities(&specification.random, &at_bound, found);

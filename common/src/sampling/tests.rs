@@ -115,13 +115,13 @@ fn the_count_is_estimated_from_above_where_it_is_not_counted() {
 fn wide_elements_are_heard_from_their_nearest_ends() {
     for tilt in [0.0, 0.04, -0.04] {
         let lines = setup(|s| s.probe.tilt = tilt);
-        let mut wide = lines;
+        let mut wide = lines.clone();
         wide.probe.element_width = 0.7e-3;
         let (sin, cos) = libm::sincos(tilt);
         let ends = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)];
         let least = |place: Place, arrival: &dyn Fn(&Setup, Place) -> f64| {
             let between = ends.map(|(source, receiver)| {
-                let mut moved = lines;
+                let mut moved = lines.clone();
                 moved.probe.source.x3 += 0.35e-3 * source * sin;
                 let x = place.x + 0.35e-3 * (receiver - source) * cos;
                 arrival(&moved, Place { x, x3: place.x3 + 0.35e-3 * receiver * sin })

@@ -35,7 +35,7 @@ impl SetupKey {
     pub(crate) fn from_specification(specification: &JobSpecification) -> Self {
         let setup = EvaluationInput {
             id: 0,
-            setup: specification.setup,
+            setup: specification.setup.clone(),
             point: specification.start(),
             germs: specification.monte_carlo.germs(),
             random: specification.random,

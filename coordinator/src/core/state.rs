@@ -281,7 +281,7 @@ impl State {
         let specification = &self.jobs.get(&job)?.record.specification;
         Some(EvaluationInput {
             id,
-            setup: specification.setup,
+            setup: specification.setup.clone(),
             point,
             germs: specification.monte_carlo.germs(),
             random: specification.random,

@@ -198,7 +198,7 @@ pub(crate) fn evaluation(
 ) -> (Outcomes, Option<EstimatedError>) {
     let evaluation = Arc::new(EvaluationInput {
         id: 1,
-        setup: specification.setup,
+        setup: specification.setup.clone(),
         point,
         random: RandomQuantities::default(),
         observables: osteon_common::observables::ObservableSet::NONE,

@@ -97,7 +97,7 @@ fn search(
     settings: Settings,
     moments: impl Fn(&Point) -> Option<Moments>,
 ) -> Found {
-    finish(Newton::new(space, data.into(), settings), space, data, moments)
+    finish(Newton::new(space.clone(), data.into(), settings), space, data, moments)
 }
 
 fn finish(
@@ -198,11 +198,11 @@ fn a_search_from_the_solution_of_the_closed_form_takes_fewer_evaluations() {
         if !admissible(&Pores::default(), &space.point(&space.start())) {
             continue;
         }
-        let usual = search(space, data, SETTINGS, |point| Some(bone(point)));
-        let newton = || Newton::new(space, data.into(), SETTINGS).from_solution();
-        let found = finish(newton(), space, data, |point| Some(bone(point)));
+        let usual = search(space.clone(), data, SETTINGS, |point| Some(bone(point)));
+        let newton = || Newton::new(space.clone(), data.into(), SETTINGS).from_solution();
+        let found = finish(newton(), space.clone(), data, |point| Some(bone(point)));
         assert_eq!(found.stop, StopReason::CostReached, "{index}: {found:?}");
-        let (off, distance) = off_nearest(space, &found.at, &bone);
+        let (off, distance) = off_nearest(space.clone(), &found.at, &bone);
         assert!(off <= 0.08 * distance + 1e-6, "{index}: off by {off} of {distance}: {found:?}");
         from_start += usual.evaluations;
         from_solution += found.evaluations;
@@ -223,7 +223,7 @@ properties! {
     fn the_answer_is_the_nearest_to_the_start(start in unit()) {
         let space = all_free(&start);
         prop_assume!(admissible(&Pores::default(), &space.point(&space.start())));
-        let found = search(space, bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
+        let found = search(space.clone(), bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
         let (off, distance) = off_nearest(space, &found.at, &bone);
         // The largest of 2000 starts was 4.6 %, the median 1.1 %.
         prop_assert!(off <= 0.08 * distance + 1e-6, "off by {off} of {distance}: {found:?}");
@@ -233,7 +233,7 @@ properties! {
     fn where_the_rule_holds_the_answer_is_exact(start in unit()) {
         let space = all_free(&start);
         prop_assume!(admissible(&Pores::default(), &space.point(&space.start())));
-        let found = search(space, rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
+        let found = search(space.clone(), rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
         prop_assert_eq!(found.stop, StopReason::CostReached);
         let (off, _) = off_nearest(space, &found.at, &rule);
         prop_assert!(off <= 1e-5, "off by {off}: {found:?}");
@@ -293,7 +293,7 @@ fn what_the_data_leave_free_and_do_not_feel_does_not_move() {
 fn one_elastic_parameter_and_the_dispersion_are_found_again() {
     for axis in [0, 1, 2, 4, 5] {
         let space = some_free(&[axis, 6]);
-        let found = search(space, bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
+        let found = search(space.clone(), bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
         assert_eq!(found.stop, StopReason::CostReached, "{axis}: {found:?}");
         assert!(found.evaluations <= 9, "{axis}: {found:?}");
         let point = space.point(&found.at);
@@ -317,7 +317,7 @@ fn a_thickness_and_the_dispersion_are_found_in_a_few_evaluations() {
     };
     let mut truth = OPTIMUM;
     truth.0[Parameter::BoneThickness as usize] = 0.83e-3;
-    let found = search(space, plate(&truth), SETTINGS, |point| Some(plate(point)));
+    let found = search(space.clone(), plate(&truth), SETTINGS, |point| Some(plate(point)));
     assert_eq!(found.stop, StopReason::CostReached, "{found:?}");
     assert!(found.evaluations <= 8, "{found:?}");
     let thickness = space.point(&found.at).get(Parameter::BoneThickness);
@@ -342,7 +342,7 @@ fn data_that_one_parameter_cannot_match_end_at_the_least_cost() {
     let data = Moments { mean: 3800.0, coefficient_of_variation: 0.031 };
     for axis in 0..7 {
         let space = some_free(&[axis]);
-        let found = search(space, data, SETTINGS, |point| Some(bone(point)));
+        let found = search(space.clone(), data, SETTINGS, |point| Some(bone(point)));
         assert_eq!(found.stop, StopReason::Converged, "{axis}: {found:?}");
         let least = least_of_one(space, data);
         assert!(found.cost <= least * (1.0 + 1e-6) + 1e-12, "{axis}: {found:?}, {least}");
@@ -432,7 +432,7 @@ fn evaluations_are_bounded() {
 fn without_a_free_parameter_there_is_one_evaluation() {
     let space = some_free(&[]);
     let far = Moments { mean: 3000.0, coefficient_of_variation: 0.1 };
-    let found = search(space, far, SETTINGS, |point| Some(bone(point)));
+    let found = search(space.clone(), far, SETTINGS, |point| Some(bone(point)));
     assert_eq!((found.stop, found.evaluations), (StopReason::Converged, 1));
     let found = search(space, far, SETTINGS, |_| None);
     assert_eq!((found.stop, found.evaluations), (StopReason::Infeasible, 1));
@@ -443,7 +443,7 @@ fn the_points_that_measure_slopes_are_foreseen() {
     // No point matches: slopes are measured before the search gives up.
     let space = all_free(&[0.5; 7]);
     let data = Moments { mean: 1500.0, coefficient_of_variation: 0.2 };
-    let mut newton = Newton::new(space, data.into(), SETTINGS);
+    let mut newton = Newton::new(space.clone(), data.into(), SETTINGS);
     let (mut foreseen, mut asked) = (Vec::<Vec<f64>>::new(), 0);
     while let Proposal::Evaluate(pending) = newton.ask() {
         let pending = pending.to_vec();

@@ -93,7 +93,7 @@ impl PosteriorProblem {
             base.0[prior.parameter as usize] = prior.quantile(0.5);
         }
         let seed = specification.monte_carlo.seed;
-        let pores = specification.setup.pores;
+        let pores = specification.setup.pores.clone();
         let points = prior_points((&priors, &pores), &base, seed, PRIOR_POINTS);
         let sample: Vec<Features> =
             points.iter().filter_map(|point| features(&pores, point)).collect();

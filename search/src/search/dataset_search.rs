@@ -96,7 +96,8 @@ impl DatasetSearch {
         let weighted = given.filter(|_| is_weighted);
         let weights = weighted.and_then(|given| MomentWeights::of_data(given, set));
         let measured = measured(specification, set);
-        let method = MethodState::new(specification, data, measured, weights, space, tolerance);
+        let method =
+            MethodState::new(specification, data, measured, weights, space.clone(), tolerance);
         let mut search = Self {
             // A job has at most a thousand sets.
             set: u32::try_from(set).unwrap_or(u32::MAX),
@@ -340,7 +341,7 @@ impl DatasetSearch {
             let set = self.set as usize;
             self.space = space_of_start(specification, set, self.start);
             let measured = measured(specification, set);
-            let (data, weights, space) = (self.data, self.weights, self.space);
+            let (data, weights, space) = (self.data, self.weights, self.space.clone());
             let tolerance = self.tolerance(specification);
             let method = MethodState::new(specification, data, measured, weights, space, tolerance);
             self.method = method_of_start(specification, self.start, method);
@@ -445,7 +446,8 @@ fn method_of_start(
 /// Returns the box for one of the searches for a set of data. Its start is that of the parameters, or a
 /// random point, which is the same for every set.
 fn space_of_start(specification: &JobSpecification, set: usize, start: u32) -> SearchBox {
-    let space = SearchBox::new(specification.ranges_of(set)).with_pores(specification.setup.pores);
+    let space =
+        SearchBox::new(specification.ranges_of(set)).with_pores(specification.setup.pores.clone());
     let start = specification.search.first_start + u64::from(start);
     if start == 0 {
         return space;

@@ -22,7 +22,7 @@ pub(super) struct GradeCaches {
 
 impl GradeCaches {
     pub(super) fn new(setup: &Setup, faces: OuterFaces, memory: &Arc<TableMemory>) -> Self {
-        let mut refined = *setup;
+        let mut refined = setup.clone();
         if sampling::first_grade(setup) != Grade::Thorough {
             refined.solver.refinement *= FULL_REFINEMENT;
         }

@@ -22,7 +22,7 @@ pub(super) struct PreparedSetup {
 impl PreparedSetup {
     pub(super) fn new(setup: &Setup, isa: Isa) -> Self {
         Self {
-            setup: *setup,
+            setup: setup.clone(),
             distances: setup.probe.distances().collect(),
             places: setup.probe.places().collect(),
             isa,

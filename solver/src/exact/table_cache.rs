@@ -55,7 +55,13 @@ impl TableCache {
         memory: &Arc<TableMemory>,
     ) -> Self {
         let memory = Arc::clone(memory);
-        Self { setup: *setup, grade, faces, memory, slots: [const { OnceLock::new() }; SPEED_BINS] }
+        Self {
+            setup: setup.clone(),
+            grade,
+            faces,
+            memory,
+            slots: [const { OnceLock::new() }; SPEED_BINS],
+        }
     }
 
     /// Returns the tables of the speed bin at `index`; `speed` (m/s) is named if they are too large.

@@ -133,7 +133,7 @@ impl Tables {
             .flat_map(|&x| wavenumbers.iter().map(move |k| Lanes(k.0.map(|k| libm::cos(k * x)))))
             .collect();
         Self {
-            setup: *setup,
+            setup: setup.clone(),
             heights,
             sampling,
             runs,

@@ -74,7 +74,7 @@ fn outcomes_with_random_setups_do_not_depend_on_threads_or_batches() {
     let germs = GermSource { seed: 5, scheme: GermScheme::Sobol { points: 5 } };
     let work = |first, count| {
         let Work { evaluation, .. } = draw_work(POINT, germs, first, count);
-        let evaluation = EvaluationInput { random, ..*evaluation };
+        let evaluation = EvaluationInput { random, ..EvaluationInput::clone(&evaluation) };
         Work { evaluation: Arc::new(evaluation), first, count }
     };
     let whole = solve(1, work(0, 7));

@@ -68,7 +68,7 @@ impl Recorder {
 
     /// Receives an evaluation that can be read.
     fn evaluation(&mut self, id: u64) {
-        let sent = EvaluationInput { id, ..*work().evaluation };
+        let sent = EvaluationInput { id, ..EvaluationInput::clone(&work().evaluation) };
         self.message(Response::Evaluation(evaluation::to_message(&sent)));
         self.nothing_else();
     }

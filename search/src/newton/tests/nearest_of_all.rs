@@ -22,7 +22,7 @@ struct Solutions {
 impl Solutions {
     fn of(space: SearchBox) -> Self {
         let logarithm = bulk_velocity(&OPTIMUM).unwrap().logarithm;
-        Self { space, start: space.start(), logarithm }
+        Self { space: space.clone(), start: space.start(), logarithm }
     }
 
     /// Returns by how much a point is too fast, and the derivatives of that.
@@ -96,7 +96,7 @@ impl Solutions {
 /// Returns the distance of the solution, and the smallest that the minimiser finds.
 fn distances(start: &[f64; 7], seed: u64) -> (f64, f64) {
     let space = all_free(start);
-    let found = search(space, rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
+    let found = search(space.clone(), rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
     assert_eq!(found.stop, StopReason::CostReached, "{start:?}: {found:?}");
     let distance = norm(&subtract(&found.at, &space.start()));
     (distance, Solutions::of(space).least(&found.at, seed))
@@ -153,7 +153,7 @@ fn a_slow_descent_is_taken_to_its_end() {
         0.0,
     ];
     let space = all_free(&start);
-    let found = search(space, rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
+    let found = search(space.clone(), rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
     let (off, _) = off_nearest(space, &found.at, &rule);
     assert!(off <= 1e-5, "off by {off}: {found:?}");
 }
@@ -180,7 +180,7 @@ fn only_what_is_clearly_nearer_is_taken() {
     for (_, start) in starts().take(1000) {
         let space = all_free(&start);
         let start = space.start();
-        let mut model = Model::new(space, start.clone(), [0.0; MOMENTS]);
+        let mut model = Model::new(space.clone(), start.clone(), [0.0; MOMENTS]);
         model.make_exact_at(&start, logarithms(rule(&space.point(&start))));
         let (alone, all) = (model.nearest_from_here(&start, data), model.nearest(&start, data));
         if alone != all {
