@@ -11,6 +11,7 @@ mod pores;
 mod porosity;
 mod posterior;
 mod priors;
+mod pulse;
 mod random_quantities;
 mod range;
 mod section;

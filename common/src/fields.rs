@@ -55,6 +55,9 @@ pub trait Fields {
     /// Declares a list of tables.
     fn list(&mut self, key: Key, field: &mut dyn List);
 
+    /// Declares a list of numbers, which may be absent; `max` is the largest number of them.
+    fn numbers(&mut self, key: Key, field: &mut Vec<f64>, accepted: Interval, max: usize);
+
     /// Declares keys that are meaningful only under a condition on an earlier key.
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields));
 

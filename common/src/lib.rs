@@ -51,6 +51,7 @@ pub mod posterior;
 mod posterior_settings;
 pub mod probe;
 pub mod pulse;
+pub mod pulse_samples;
 pub mod quantile;
 pub mod random_quantities;
 pub mod realization;

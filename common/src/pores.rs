@@ -30,10 +30,12 @@ pub enum ProfileShape {
     /// It is that of the skin's side in the outer half of the bone, and that of the marrow's side in the
     /// inner (endosteal) half.
     Endosteal,
+    /// As in a table of sublayers.
+    Table,
 }
 
-/// A porosity that changes through the thickness. There is none unless both ends are given.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A porosity that changes through the thickness. There is none unless both ends, or a table, are given.
+#[derive(Debug, Clone, PartialEq)]
 pub struct PorosityProfile {
     /// Porosity at the skin's side.
     pub surface: Option<f64>,
@@ -44,6 +46,8 @@ pub struct PorosityProfile {
     /// Number of sublayers of equal thickness by which a linear profile is computed, each with the porosity
     /// at its middle.
     pub sublayers: u32,
+    /// Porosities of the sublayers of a table, all of the same thickness, from the skin's side to the marrow's.
+    pub values: Vec<f64>,
 }
 
 /// The pores of the bone; without any porosity there are none.
@@ -59,37 +63,57 @@ pub struct Pores {
 
 impl ProfileShape {
     /// All shapes, in the order in which messages and documentation list them.
-    pub const ALL: [Self; 2] = [Self::Linear, Self::Endosteal];
+    pub const ALL: [Self; 3] = [Self::Linear, Self::Endosteal, Self::Table];
 
     /// Returns the name used in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
             Self::Endosteal => "endosteal",
+            Self::Table => "table",
         }
     }
 }
 
 impl Default for PorosityProfile {
     fn default() -> Self {
-        Self { surface: None, marrow: None, shape: ProfileShape::default(), sublayers: 6 }
+        Self {
+            surface: None,
+            marrow: None,
+            shape: ProfileShape::default(),
+            sublayers: 6,
+            values: Vec::new(),
+        }
     }
 }
 
 impl PorosityProfile {
-    /// Returns both ends; `None` unless both are given.
-    pub fn ends(&self) -> Option<[f64; 2]> {
-        Some([self.surface?, self.marrow?])
+    /// Returns whether a profile is given.
+    pub fn is_given(&self) -> bool {
+        self.mean().is_some()
     }
 
-    /// Returns the porosity of each sublayer, downwards, all of the same thickness.
-    fn of_sublayers(&self, [surface, marrow]: [f64; 2]) -> Vec<f64> {
+    /// Returns the mean through the thickness; `None` without a profile.
+    fn mean(&self) -> Option<f64> {
         match self.shape {
-            ProfileShape::Endosteal => vec![surface, marrow],
+            ProfileShape::Linear | ProfileShape::Endosteal => {
+                Some(0.5 * (self.surface? + self.marrow?))
+            }
+            ProfileShape::Table if self.values.is_empty() => None,
+            ProfileShape::Table => Some(self.values.iter().sum::<f64>() / self.values.len() as f64),
+        }
+    }
+
+    /// Returns the porosity of each sublayer, downwards, all of the same thickness; `None` without a profile.
+    fn of_sublayers(&self) -> Option<Vec<f64>> {
+        match self.shape {
+            ProfileShape::Table => Some(self.values.clone()).filter(|values| !values.is_empty()),
+            ProfileShape::Endosteal => Some(vec![self.surface?, self.marrow?]),
             ProfileShape::Linear => {
+                let (surface, marrow) = (self.surface?, self.marrow?);
                 let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(self.sublayers);
                 let at = |i| (marrow - surface).mul_add(middle(i), surface);
-                (0..self.sublayers).map(at).collect()
+                Some((0..self.sublayers).map(at).collect())
             }
         }
     }
@@ -110,8 +134,7 @@ impl Pores {
 
     /// Returns the mean porosity through the thickness; `None` without pores.
     pub fn mean_porosity(&self) -> Option<f64> {
-        self.porosity
-            .or_else(|| self.profile.ends().map(|[surface, marrow]| 0.5 * (surface + marrow)))
+        self.porosity.or_else(|| self.profile.mean())
     }
 
     /// Returns the pores with the porosities of a point, where it has any.
@@ -125,9 +148,9 @@ impl Pores {
             profile: PorosityProfile {
                 surface: searched(Parameter::SurfacePorosity, self.profile.surface),
                 marrow: searched(Parameter::MarrowPorosity, self.profile.marrow),
-                ..self.profile
+                ..self.profile.clone()
             },
-            ..*self
+            model: self.model,
         }
     }
 
@@ -208,11 +231,10 @@ impl Pores {
         if let Some(porosity) = self.porosity {
             return solid(porosity).map(CaseBone::Homogeneous);
         }
-        let Some(ends) = self.profile.ends() else {
+        let Some(porosities) = self.profile.of_sublayers() else {
             let whole = matrix.bone().map_err(NoPorousBone::from)?;
             return realize(whole).map(CaseBone::Homogeneous);
         };
-        let porosities = self.profile.of_sublayers(ends);
         let each = thickness / porosities.len() as f64;
         let sublayer = |&porosity| Ok(Sublayer { thickness: each, solid: solid(porosity)? });
         let sublayers = porosities.iter().map(sublayer).collect::<Result<Vec<_>, E>>()?;
@@ -241,20 +263,30 @@ impl Section for PorosityProfile {
         fields.optional_number(key, &mut self.surface, number);
         let key = Key { name: "marrow", meaning: "porosity at the marrow's side" };
         fields.optional_number(key, &mut self.marrow, number);
-        let meaning = "`\"linear\"`; or `\"endosteal\"`: the inner half of the bone has that of the \
-                       marrow's side, and the outer half that of the skin's";
+        let meaning = "`\"linear\"`; `\"endosteal\"`: the inner half of the bone has that of the marrow's \
+                       side, and the outer half that of the skin's; or `\"table\"`: as in `values`, without \
+                       `surface` and `marrow`";
         fields.choice(Key { name: "shape", meaning }, &mut self.shape);
-        let condition = Condition {
-            holds: self.shape == ProfileShape::Linear,
+        let shape = self.shape;
+        let only = |wanted: ProfileShape, description| Condition {
+            holds: shape == wanted,
             decided_by: "shape",
-            description: "with the shape `\"linear\"`",
-            refusal: "belongs to the shape \"linear\", which is not chosen; leave it out"
-                .to_owned(),
+            description,
+            refusal: format!(
+                "belongs to the shape \"{}\", which is not chosen; leave it out",
+                wanted.name()
+            ),
         };
-        fields.only_if(&condition, &mut |fields| {
+        fields.only_if(&only(ProfileShape::Linear, "with the shape `\"linear\"`"), &mut |fields| {
             let meaning =
                 "number of sublayers of equal thickness, each with the porosity at its middle";
             fields.whole(Key { name: "sublayers", meaning }, &mut self.sublayers, SUBLAYERS);
+        });
+        fields.only_if(&only(ProfileShape::Table, "with the shape `\"table\"`"), &mut |fields| {
+            let meaning = "porosities of 2 to 16 sublayers of equal thickness, from the skin's side to the \
+                           marrow's";
+            let key = Key { name: "values", meaning };
+            fields.numbers(key, &mut self.values, porosity::ACCEPTED, SUBLAYERS_MAX);
         });
     }
 }

@@ -115,7 +115,7 @@ impl Probe {
     /// Returns the frequency, Hz, in which bands are measured: the centre frequency, or more if the pulse
     /// needs a wider band than the paper's.
     pub fn band_unit(&self) -> f64 {
-        self.center_frequency * self.pulse.bandwidth()
+        self.center_frequency * self.pulse.bandwidth(self.center_frequency)
     }
 
     /// Returns the frequency, Hz, at which A0 and S0 are computed.
@@ -170,9 +170,7 @@ impl Section for Probe {
             &mut self.amplitude,
             Number::within(Interval::above(0.0, "N")),
         );
-        fields.table(Key { name: "pulse", meaning: "form of the pulse" }, &mut |fields| {
-            self.pulse.declare(fields);
-        });
+        fields.custom_table(PulseForm::KEY);
         let guided = "frequency at which the guided waves A0 and S0 are computed; by default \
                       `center_frequency`";
         fields.optional_number(

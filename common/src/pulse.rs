@@ -1,22 +1,22 @@
 //! The form of the source's pulse, and how samplings, which are made for the paper's pulse, change with it.
 //!
-//! Times are in periods of the centre frequency, from the pulse's start on. The values of a pulse are in
-//! the solver.
+//! The values of a pulse of a formula are in the solver, those of a pulse of samples in
+//! [`crate::pulse_samples`].
 
 use crate::accepted::Interval;
-use crate::fields::{self, Condition, Fields, Key, Number, Section};
+use crate::fields::Key;
+use crate::pulse_samples::PulseSamples;
 
-fields::choices!(PulseShape);
-
-/// Fewest cycles of a tone: with one, it is a wave of one peak and one trough.
-const CYCLES_MIN: f64 = 1.0;
-/// Most cycles of a tone: the first extremum of longer ones is too small beside the waves that follow it.
-const CYCLES_MAX: f64 = 6.0;
+/// Cycles that a tone may have. With one, it is a wave of one peak and one trough; the first extremum of
+/// one with more than six is too small beside the waves that follow it.
+pub const TONE_CYCLES: Interval = Interval::from_to(1.0, 6.0, "cycles");
 /// Cycles of the paper's pulse.
 const PAPER_CYCLES: f64 = 2.0;
 /// Middle of the Ricker pulse, in periods: so late that the pulse starts at 6e-6 of its amplitude.
 pub const RICKER_MIDDLE: f64 = 1.25;
-/// Time by which the first extremum of the Ricker pulse is later than the paper's, in periods: 0.860 - 0.359.
+/// Time of the first extremum of the paper's pulse, in periods.
+const PAPER_FIRST: f64 = 0.359;
+/// Time by which the first extremum of the Ricker pulse is later, in periods: 0.860 - 0.359.
 const RICKER_DELAY: f64 = 0.5;
 /// Ratio of the frequencies above which the spectra of the Ricker pulse and of the paper's are less than
 /// a hundredth of their peaks, rounded up from 1.16.
@@ -26,104 +26,82 @@ const RICKER_BANDWIDTH: f64 = 1.2;
 /// above the centre frequency.
 const PAPER_END: f64 = 2.38;
 
-/// The shape of a pulse.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum PulseShape {
+/// The form of a pulse: everything about it but centre frequency and amplitude.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum PulseForm {
     /// The paper's: a tone of two cycles.
     #[default]
     Paper,
     /// A sine that starts at t = 0, under a Gaussian.
-    Tone,
+    Tone {
+        /// Cycles n, [`TONE_CYCLES`]: the Gaussian is exp(-4 (2 fc t/n - 1)²), which is largest after n/2 cycles
+        /// and e⁻⁴ of that at t = 0 and after n cycles.
+        cycles: f64,
+    },
     /// The second derivative of a Gaussian: a peak between two troughs.
     Ricker,
-}
-
-impl PulseShape {
-    /// All shapes, in the order in which messages and documentation list them.
-    pub const ALL: [Self; 3] = [Self::Paper, Self::Tone, Self::Ricker];
-
-    /// Returns the name used in files and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Tone => "tone",
-            Self::Ricker => "ricker",
-        }
-    }
-}
-
-/// The form of a pulse: everything about it but centre frequency and amplitude.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PulseForm {
-    /// The shape.
-    pub shape: PulseShape,
-    /// Cycles n of a tone, 1 to 6: its Gaussian is exp(-4 (2 fc t/n - 1)²), which is largest after n/2 cycles
-    /// and e⁻⁴ of that at t = 0 and after n cycles. Other shapes have the default.
-    pub cycles: f64,
-}
-
-impl Default for PulseForm {
-    fn default() -> Self {
-        Self { shape: PulseShape::Paper, cycles: 3.0 }
-    }
+    /// A measured pulse.
+    Samples(PulseSamples),
 }
 
 impl PulseForm {
+    /// The key of a probe that has it.
+    pub const KEY: Key = Key {
+        name: "pulse",
+        meaning: "form of the pulse: `\"paper\"`, `\"ricker\"`, a tone `{ tone = 3.0 }` of 1 to 6 cycles, or \
+                  measured: `{ file = \"pulse.csv\" }`, or `{ step = 2e-8, samples = [0.0, …] }` with the step in s \
+                  ([physics.md](physics.md#the-pulse) has formulas and rules)",
+    };
+    /// The forms without a number, by their names in files.
+    pub const NAMED: [(&str, Self); 2] = [("paper", Self::Paper), ("ricker", Self::Ricker)];
+
     /// Returns the number of cycles of the tone that the pulse is; `None` if it is none.
     pub fn tone_cycles(&self) -> Option<f64> {
-        match self.shape {
-            PulseShape::Paper => Some(PAPER_CYCLES),
-            PulseShape::Tone => Some(self.cycles),
-            PulseShape::Ricker => None,
+        match self {
+            Self::Paper => Some(PAPER_CYCLES),
+            Self::Tone { cycles } => Some(*cycles),
+            Self::Ricker | Self::Samples(_) => None,
         }
     }
 
-    /// Returns the ratio of the band that the pulse needs to that of the paper's pulse; at least 1.
-    pub fn bandwidth(&self) -> f64 {
-        match self.tone_cycles() {
-            None => RICKER_BANDWIDTH,
-            Some(cycles) if cycles < PAPER_CYCLES => {
+    /// Returns the ratio of the band that the pulse needs to that of the paper's pulse of this centre
+    /// frequency, Hz; at least 1.
+    pub fn bandwidth(&self, center_frequency: f64) -> f64 {
+        match self {
+            Self::Ricker => RICKER_BANDWIDTH,
+            Self::Tone { cycles } if *cycles < PAPER_CYCLES => {
                 (1.0 + (PAPER_END - 1.0) * PAPER_CYCLES / cycles) / PAPER_END
             }
             // A longer tone has a narrower spectrum, but the same tail of the kink at t = 0, which decides.
-            Some(_) => 1.0,
+            Self::Paper | Self::Tone { .. } => 1.0,
+            Self::Samples(samples) => {
+                (samples.last_frequency() / (PAPER_END * center_frequency)).max(1.0)
+            }
         }
     }
 
-    /// Returns the time by which the first extremum is later than that of the paper's pulse, in periods.
-    pub fn delay(&self) -> f64 {
-        if self.tone_cycles().is_some() { 0.0 } else { RICKER_DELAY }
+    /// Returns the time by which the first extremum is later than that of the paper's pulse of this centre
+    /// frequency (Hz), in its periods; at least 0.
+    pub fn delay(&self, center_frequency: f64) -> f64 {
+        match self {
+            Self::Paper | Self::Tone { .. } => 0.0,
+            Self::Ricker => RICKER_DELAY,
+            Self::Samples(samples) => {
+                (samples.first_extremum() * center_frequency - PAPER_FIRST).max(0.0)
+            }
+        }
     }
 
-    /// Returns the time by which the pulse ends later than the paper's, in periods.
-    pub fn lateness(&self) -> f64 {
-        self.tone_cycles().map_or(RICKER_DELAY, |cycles| (cycles - PAPER_CYCLES).max(0.0))
-    }
-}
-
-impl Section for PulseForm {
-    fn declare(&mut self, fields: &mut dyn Fields) {
-        let shape = "shape: `\"paper\"`, `\"tone\"`, or `\"ricker\"` \
-                     ([physics.md](physics.md#the-pulse) has the formulas)";
-        fields.choice(Key { name: "shape", meaning: shape }, &mut self.shape);
-        let (given, tone) = (self.shape.name(), PulseShape::Tone.name());
-        let condition = Condition {
-            holds: self.shape == PulseShape::Tone,
-            decided_by: "shape",
-            description: "for `\"tone\"`",
-            refusal: format!(
-                "belongs to the shape \"{tone}\", and probe.pulse.shape is \"{given}\"; leave it out, or \
-                 set probe.pulse.shape = \"{tone}\""
-            ),
-        };
-        fields.only_if(&condition, &mut |fields| {
-            let cycles = "cycles of the tone; with 2 it is the paper's pulse";
-            fields.number(
-                Key { name: "cycles", meaning: cycles },
-                &mut self.cycles,
-                Number::within(Interval::from_to(CYCLES_MIN, CYCLES_MAX, "cycles")),
-            );
-        });
+    /// Returns the time by which the pulse ends later than the paper's of this centre frequency (Hz), in its
+    /// periods: where it has fallen to e⁻⁴ of its largest value. At least [`PulseForm::delay`].
+    pub fn lateness(&self, center_frequency: f64) -> f64 {
+        match self {
+            Self::Samples(samples) => {
+                let late = samples.end() * center_frequency - PAPER_CYCLES;
+                late.max(self.delay(center_frequency))
+            }
+            _ => self.tone_cycles().map_or(RICKER_DELAY, |cycles| (cycles - PAPER_CYCLES).max(0.0)),
+        }
     }
 }
 
@@ -133,18 +111,17 @@ mod tests {
 
     #[test]
     fn samplings_change_only_with_the_pulse() {
-        let tone = |cycles| PulseForm { shape: PulseShape::Tone, cycles };
-        let ricker = PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() };
+        let tone = |cycles| PulseForm::Tone { cycles };
         for (form, bandwidth, delay, lateness) in [
-            (PulseForm::default(), 1.0, 0.0, 0.0),
+            (PulseForm::Paper, 1.0, 0.0, 0.0),
             (tone(2.0), 1.0, 0.0, 0.0),
             (tone(5.0), 1.0, 0.0, 3.0),
             // A hundredth at 1 + 2 · 1.38 centre frequencies.
             (tone(1.0), 3.76 / 2.38, 0.0, 0.0),
-            (ricker, 1.2, 0.5, 0.5),
+            (PulseForm::Ricker, 1.2, 0.5, 0.5),
         ] {
-            assert_eq!((form.delay(), form.lateness()), (delay, lateness), "{form:?}");
-            assert!((form.bandwidth() - bandwidth).abs() < 1e-15, "{form:?}");
+            assert_eq!((form.delay(1e6), form.lateness(1e6)), (delay, lateness), "{form:?}");
+            assert!((form.bandwidth(1e6) - bandwidth).abs() < 1e-15, "{form:?}");
         }
     }
 }

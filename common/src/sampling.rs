@@ -245,11 +245,11 @@ impl WaveSampling {
             Grade::Quick | Grade::Plain => (1.0, QUICK_LATEST, QUICK_LATEST),
             Grade::Thorough | Grade::Full => (4.0, 2.5, f64::INFINITY),
         };
-        let reflected_length = reflected_length + pulse.lateness();
+        let reflected_length = reflected_length + pulse.lateness(fc);
         let (latest_pick, latest_source) =
-            (latest_pick + pulse.delay(), latest_source + pulse.delay());
+            (latest_pick + pulse.delay(fc), latest_source + pulse.delay(fc));
         let damping = wrap_damping(setup, grade);
-        let mut longest = (SHORTEST_PERIOD + pulse.lateness()) / fc;
+        let mut longest = (SHORTEST_PERIOD + pulse.lateness(fc)) / fc;
         let mut last = 0.0_f64;
         for place in setup.probe.places() {
             let earliest = earliest_arrival(setup, place, speed);

@@ -52,29 +52,29 @@ pub fn of_input(input: &InputFile) -> Result<Case, FileError> {
         Ok(root) if root.has("parameters") && !root.has("bone") => {
             Err(FileError::JobForCase { path })
         }
-        Ok(root) => of_tree(document, &root)
+        Ok(root) => of_tree(document, &root, input.directory())
             .map_err(|invalid| FileError::Content { path, content: invalid.into() }),
         Err(error) => Err(FileError::Content { path, content: error.into() }),
     }
 }
 
-/// Reads and validates the text of a case file.
+/// Reads and validates the text of a case file. Names of files in it are relative to the current directory.
 ///
 /// # Errors
 /// If the text is malformed or violates a rule; all violations are reported at once.
 pub fn parse(text: &str, format: Format) -> Result<Case, ContentError> {
     let document = DocumentText::new(text, format);
-    Ok(of_tree(document, &document.tree()?)?)
+    Ok(of_tree(document, &document.tree()?, Path::new(""))?)
 }
 
-fn of_tree(document: DocumentText<'_>, root: &Node) -> Result<Case, Invalid> {
+fn of_tree(document: DocumentText<'_>, root: &Node, directory: &Path) -> Result<Case, Invalid> {
     let mut reader = Reader::default();
     let keys = ["layers", "probe", "picking", "solver", "bone"];
     let table = reader.root(root, &keys);
     if !table.is_table() {
         return Err(reader.refuse(document, root));
     }
-    let mut setup = job_file::setup(&mut reader, &table);
+    let mut setup = job_file::setup(&mut reader, &table, directory);
     let bone = bone::read(&mut reader, &table, &mut setup);
     check::setup(&setup, &mut reader.violations);
     match bone {

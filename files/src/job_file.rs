@@ -19,6 +19,7 @@ use osteon_common::job::{
 };
 use osteon_common::limits;
 use osteon_common::pores::Pores;
+use osteon_common::pulse::PulseForm;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::warnings::{self, Warning};
 
@@ -26,9 +27,9 @@ use crate::document::{Format, Node};
 use crate::document_text::DocumentText;
 use crate::file_error::{ContentError, FileError, Invalid, SizeLimit};
 use crate::input_file::InputFile;
-use crate::pores;
 use crate::reader::{self, Reader, Table};
 use crate::setting::Setting;
+use crate::{pores, pulse};
 
 pub use self::key_tables::{job_table, porosity_table, setup_table};
 pub use self::purpose::{FilePurpose, purpose};
@@ -151,7 +152,10 @@ fn of_tree(
     if !table.is_table() {
         return Err(reader.refuse(document, root));
     }
-    let setup = Setup { pores: pores::of_job(&mut reader, &table), ..setup(&mut reader, &table) };
+    let setup = Setup {
+        pores: pores::of_job(&mut reader, &table),
+        ..setup(&mut reader, &table, directory)
+    };
     let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
     let posterior = posterior::read(&mut reader, &table);
     let (objective, objective_omitted) = objective(&mut reader, &table);
@@ -184,11 +188,18 @@ fn of_tree(
 }
 
 /// Reads the sections that case and job files share.
-pub(crate) fn setup(reader: &mut Reader, root: &Table<'_>) -> Setup {
+///
+/// Names of files are relative to `directory`.
+pub(crate) fn setup(reader: &mut Reader, root: &Table<'_>, directory: &Path) -> Setup {
     let mut setup = Setup::default();
+    let mut form = PulseForm::default();
     for (key, section) in setup.sections() {
-        reader::section(reader, root, key.name, section);
+        let table = reader::section(reader, root, key.name, section);
+        if key.name == "probe" {
+            form = pulse::read(reader, &table, directory);
+        }
     }
+    setup.probe.pulse = form;
     setup
 }
 

@@ -20,6 +20,8 @@ pub mod job_file;
 pub mod materials;
 mod pores;
 pub mod posterior_csv;
+mod pulse;
+mod pulse_file;
 mod reader;
 pub mod report;
 pub mod results_csv;

@@ -1,7 +1,7 @@
 //! `porosity` of a section `[bone]`: a number, or the table of a profile.
 
 use osteon_common::parameters::Parameter;
-use osteon_common::pores::{Pores, PorosityProfile};
+use osteon_common::pores::{Pores, PorosityProfile, ProfileShape, SUBLAYERS};
 use osteon_common::porosity::{POROSITY, PorosityModel};
 
 use crate::reader::{self, Reader, Table};
@@ -22,8 +22,12 @@ pub(crate) fn porosity(reader: &mut Reader, bone: &Table<'_>) -> (Option<f64>, P
         return (reader.number(bone, POROSITY.name), profile);
     }
     let table = reader::section(reader, bone, POROSITY.name, &mut profile);
-    for key in ["surface", "marrow"].into_iter().filter(|key| !table.has(key)) {
-        reader.missing(&table, key, Parameter::Porosity.row().accepted);
+    if profile.shape == ProfileShape::Table && !table.has("values") {
+        reader.missing(&table, "values", format!("a list of porosities, {SUBLAYERS}"));
+    } else if profile.shape != ProfileShape::Table {
+        for key in ["surface", "marrow"].into_iter().filter(|key| !table.has(key)) {
+            reader.missing(&table, key, Parameter::Porosity.row().accepted);
+        }
     }
     (None, profile)
 }

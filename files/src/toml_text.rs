@@ -15,6 +15,7 @@ use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::Parameter;
 use osteon_common::pores::Pores;
 use osteon_common::porosity::{POROSITY, PorosityModel};
+use osteon_common::pulse::PulseForm;
 use osteon_common::setup_quantity::SetupQuantity;
 
 /// Number of velocities per line of an inlined data set.
@@ -70,6 +71,7 @@ fn written(write: impl FnOnce(&mut String) -> fmt::Result) -> String {
 /// Writes the sections of a setup without the keys with these paths.
 fn setup(out: &mut String, setup: &Setup, left_out: &[&str]) -> fmt::Result {
     let mut setup = setup.clone();
+    let pulse_form = setup.probe.pulse.clone();
     for (index, (key, declared)) in setup.sections().into_iter().enumerate() {
         if index > 0 {
             writeln!(out)?;
@@ -77,8 +79,27 @@ fn setup(out: &mut String, setup: &Setup, left_out: &[&str]) -> fmt::Result {
         let mut entries = entries(declared);
         leave_out(&mut entries, key.name, left_out);
         write_entries(out, key, &entries)?;
+        if key.name == "probe" {
+            pulse(out, &pulse_form)?;
+        }
     }
     Ok(())
+}
+
+/// Writes the form of a pulse.
+fn pulse(out: &mut String, form: &PulseForm) -> fmt::Result {
+    write!(out, "{} = ", PulseForm::KEY.name)?;
+    match form {
+        PulseForm::Tone { cycles } => writeln!(out, "{{ tone = {cycles:?} }}  # cycles"),
+        PulseForm::Samples(samples) => {
+            let (step, values) = (samples.step(), samples.values());
+            writeln!(out, "{{ step = {step:?}, samples = {values:?} }}  # s")
+        }
+        PulseForm::Paper | PulseForm::Ricker => {
+            let named = PulseForm::NAMED.iter().find(|(_, named)| named == form);
+            writeln!(out, "\"{}\"", named.map_or("", |(name, _)| name))
+        }
+    }
 }
 
 /// Writes the section of a job's pores, if there are any.
@@ -86,7 +107,7 @@ fn pores(out: &mut String, pores: &Pores) -> fmt::Result {
     if !pores.is_any() {
         return Ok(());
     }
-    let (mut profile, mut model) = (pores.profile, pores.model);
+    let (mut profile, mut model) = (pores.profile.clone(), pores.model);
     let porosity = match pores.porosity {
         Some(porosity) => Some(format!("{porosity:?}")),
         None => inline_table(&entries(&mut profile)),
@@ -141,6 +162,8 @@ pub(crate) fn value(value: &DeclaredValue) -> Option<String> {
             let elements = elements.iter().filter_map(|entries| inline_table(entries));
             format!("[{}]", elements.collect::<Vec<_>>().join(", "))
         }
+        DeclaredValue::Numbers { values, .. } if values.is_empty() => return None,
+        DeclaredValue::Numbers { values, .. } => format!("{values:?}"),
         DeclaredValue::CustomTable => return None,
     })
 }

@@ -22,7 +22,7 @@ use osteon_common::job::{Sampling, SearchMethod};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Parameter;
 use osteon_common::probe::{Probe, Receivers, Source};
-use osteon_common::pulse::{PulseForm, PulseShape};
+use osteon_common::pulse::PulseForm;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_files::document::Format;
@@ -78,7 +78,7 @@ const DEFAULT_SETUP: Setup = Setup {
     probe: Probe {
         center_frequency: 1e6,
         amplitude: 100.0,
-        pulse: PulseForm { shape: PulseShape::Paper, cycles: 3.0 },
+        pulse: PulseForm::Paper,
         guided_wave_frequency: None,
         element_width: 0.0,
         source: Source { x1: 0.0, x3: 2e-3 },
@@ -255,7 +255,7 @@ fn a_complete_job_means_what_it_says() {
             probe: Probe {
                 center_frequency: 0.9e6,
                 amplitude: 99.0,
-                pulse: PulseForm { shape: PulseShape::Tone, cycles: 4.5 },
+                pulse: PulseForm::Tone { cycles: 4.5 },
                 guided_wave_frequency: Some(0.2e6),
                 element_width: 0.5e-3,
                 source: Source { x1: 1e-3, x3: 3e-3 },

@@ -76,6 +76,7 @@ fn a_profile_makes_sublayers_of_the_bones_thickness() {
     check("{ surface = 0.0625, marrow = 0.1875, sublayers = 2 }", &[0.09375, 0.15625]);
     let endosteal = "{ surface = 0.05, marrow = 0.15, shape = \"endosteal\" }";
     check(endosteal, &[0.05, 0.15]);
+    check("{ shape = \"table\", values = [0.04, 0.05, 0.3] }", &[0.04, 0.05, 0.3]);
 }
 
 #[test]

@@ -294,7 +294,8 @@ fn the_draws_and_evaluations_of_many_groups_are_bounded() {
     };
     assert_eq!(of("simplex", "[posterior]\n"), "ACCEPTED");
     let draws = of("simplex", "[posterior]\ndraws = 2001\n");
-    let expected = "posterior.draws: is 2001, for each of 1000 groups; all have at most 2000000";
+    let expected =
+        "posterior.draws: is 2001, for each of 1000 groups; all together may have 2000000";
     assert!(draws.ends_with(expected), "{draws}");
     let searched = of("simplex", "[posterior]\nmax_evaluations = 701\n");
     let expected = "search.max_evaluations: is 300, of each of 1000 searches, and each of 1000 \

@@ -7,8 +7,8 @@ use std::sync::LazyLock;
 
 use osteon_common::field_path::element_path;
 use osteon_common::fields::{
-    self, Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, List, Number, Section, Whole,
-    WholeRange,
+    self, Choice, Condition, DeclaredKey, DeclaredValue, Fields, Interval, Key, List, Number,
+    Section, Whole, WholeRange,
 };
 use osteon_common::violations::Violations;
 use prost::{Message, Name};
@@ -91,6 +91,9 @@ fn field_value(field: &FieldDescriptor, value: &DeclaredValue) -> Option<FieldVa
                 FieldValue::Message(message)
             };
             FieldValue::List(elements.iter().map(message).collect())
+        }
+        (DeclaredValue::Numbers { values, .. }, _) => {
+            FieldValue::List(values.iter().copied().map(FieldValue::F64).collect())
         }
         (
             DeclaredValue::Choice { .. }
@@ -192,6 +195,11 @@ impl Fields for MessageReader<'_> {
         }
     }
 
+    fn numbers(&mut self, key: Key, field: &mut Vec<f64>, _: Interval, _: usize) {
+        let Some((_, FieldValue::List(elements))) = self.get(key.name) else { return };
+        *field = elements.iter().filter_map(FieldValue::as_f64).collect();
+    }
+
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {
         if condition.holds {
             return declare(self);
@@ -251,6 +259,7 @@ mod tests {
                     assert!(field.is_list(), "{}", field.full_name());
                     check(keys, &inner);
                 }
+                (DeclaredValue::Numbers { .. }, Kind::Double) => assert!(field.is_list()),
                 (DeclaredValue::CustomTable, Kind::Message(_)) => {}
                 (value, kind) => panic!("{}: {value:?} as {kind:?}", field.full_name()),
             }

@@ -19,6 +19,7 @@ pub mod malformed;
 pub mod observed;
 pub mod parameter_values;
 mod posterior_settings;
+mod pulse;
 pub mod realizations;
 pub mod setup;
 pub mod spans;

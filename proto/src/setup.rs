@@ -9,6 +9,7 @@ use osteon_common::settings::{Picking, SolverSettings};
 use osteon_common::violations::Violations;
 
 use crate::fields;
+use crate::pulse;
 use crate::v1;
 
 /// The messages of a [`Setup`].
@@ -31,7 +32,10 @@ pub fn to_messages(setup: &Setup) -> SetupMessages {
     let mut setup = setup.clone();
     SetupMessages {
         layers: fields::to_message(&mut setup.layers),
-        probe: fields::to_message(&mut setup.probe),
+        probe: v1::Probe {
+            pulse: Some(pulse::to_message(&setup.probe.pulse)),
+            ..fields::to_message(&mut setup.probe)
+        },
         picking: fields::to_message(&mut setup.picking),
         solver: fields::to_message(&mut setup.solver),
         bone: setup.pores.is_any().then(|| fields::to_message(&mut setup.pores)),
@@ -54,6 +58,9 @@ pub fn from_messages(
     }
     if let Some(message) = probe {
         fields::from_message("probe", message, &mut setup.probe, violations);
+        let pulse = message.pulse.as_ref();
+        setup.probe.pulse =
+            pulse.and_then(|message| pulse::from_message(message, violations)).unwrap_or_default();
     }
     if let Some(message) = bone {
         fields::from_message("bone", message, &mut setup.pores, violations);

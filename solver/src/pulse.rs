@@ -6,12 +6,17 @@
 //! tone of n cycles   F = F1 sin(2π p) exp(-4 (2p/n - 1)²); n = 2 is the paper's Eq. (3)
 //! Ricker             F = F1 (1 - 2 u²) exp(-u²),  u = π (p - 1.25)
 //! ```
+//!
+//! or the spline through samples, the largest of which is F1 or -F1.
+
+mod spline;
 
 use std::f64::consts::PI;
 
 use osteon_common::probe::Probe;
 use osteon_common::pulse::{PulseForm, RICKER_MIDDLE};
 
+use self::spline::Spline;
 use crate::complex::Complex;
 use crate::quadrature::{PANEL_PHASE, for_each_node};
 
@@ -32,29 +37,47 @@ const BISECTIONS: u32 = 40;
 pub(crate) struct Pulse {
     amplitude: f64,
     center_frequency: f64,
-    form: PulseForm,
+    values: Values,
+}
+
+/// The values of a pulse, for the amplitude 1.
+#[derive(Debug, Clone)]
+enum Values {
+    /// Of a tone with this number of cycles.
+    Tone(f64),
+    Ricker,
+    Samples(Spline),
 }
 
 impl Pulse {
     /// Creates the pulse of a probe, but with this amplitude.
     pub(crate) fn new(amplitude: f64, probe: &Probe) -> Self {
-        Self { amplitude, center_frequency: probe.center_frequency, form: probe.pulse.clone() }
+        let values = match (&probe.pulse, probe.pulse.tone_cycles()) {
+            (_, Some(cycles)) => Values::Tone(cycles),
+            (PulseForm::Samples(samples), None) => Values::Samples(Spline::new(samples)),
+            (_, None) => Values::Ricker,
+        };
+        Self { amplitude, center_frequency: probe.center_frequency, values }
     }
 
     /// Time after which the pulse is over, s.
     pub(crate) fn length(&self) -> f64 {
-        self.lasting(LENGTH, RICKER_LENGTH)
+        self.duration(LENGTH, RICKER_LENGTH)
     }
 
     /// Time after which the pulse is below 1e-10 of its amplitude, s.
     pub(crate) fn extent(&self) -> f64 {
-        self.lasting(EXTENT, RICKER_EXTENT)
+        self.duration(EXTENT, RICKER_EXTENT)
     }
 
-    /// Returns the time, s, that lasts as many periods in the paper's pulse, or in the Ricker pulse.
-    fn lasting(&self, paper: f64, ricker: f64) -> f64 {
-        self.form.tone_cycles().map_or(ricker, |cycles| 0.5 * cycles * paper)
-            / self.center_frequency
+    /// Returns a time, s, that is so many periods in the paper's pulse, or in the Ricker pulse; of samples that
+    /// of their end.
+    fn duration(&self, paper: f64, ricker: f64) -> f64 {
+        match &self.values {
+            Values::Tone(cycles) => 0.5 * cycles * paper / self.center_frequency,
+            Values::Ricker => ricker / self.center_frequency,
+            Values::Samples(spline) => spline.length(),
+        }
     }
 
     /// F(t) at `t` in s; 0 before t = 0.
@@ -63,17 +86,18 @@ impl Pulse {
             return 0.0;
         }
         let periods = self.center_frequency * t;
-        match self.form.tone_cycles() {
-            Some(cycles) => {
-                let (from_middle, _) = tone_envelope(cycles, periods);
+        match &self.values {
+            Values::Tone(cycles) => {
+                let (from_middle, _) = tone_envelope(*cycles, periods);
                 self.amplitude
                     * libm::sin(2.0 * PI * periods)
                     * libm::exp(-4.0 * from_middle * from_middle)
             }
-            None => {
+            Values::Ricker => {
                 let u = PI * (periods - RICKER_MIDDLE);
                 self.amplitude * (1.0 - 2.0 * u * u) * libm::exp(-u * u)
             }
+            Values::Samples(spline) => self.amplitude * spline.at(t).0,
         }
     }
 
@@ -81,26 +105,24 @@ impl Pulse {
     pub(crate) fn slope_at(&self, t: f64) -> f64 {
         let periods = self.center_frequency * t;
         let scale = self.amplitude * self.center_frequency;
-        match self.form.tone_cycles() {
-            Some(cycles) => {
-                let (from_middle, rate) = tone_envelope(cycles, periods);
+        match &self.values {
+            Values::Tone(cycles) => {
+                let (from_middle, rate) = tone_envelope(*cycles, periods);
                 let (sin, cos) = libm::sincos(2.0 * PI * self.center_frequency * t);
                 let envelope = libm::exp(-4.0 * from_middle * from_middle);
                 scale * envelope * (2.0 * PI * cos - 8.0 * from_middle * rate * sin)
             }
-            None => {
+            Values::Ricker => {
                 let u = PI * (periods - RICKER_MIDDLE);
                 scale * PI * (4.0 * u * u - 6.0) * u * libm::exp(-u * u)
             }
+            Values::Samples(spline) => self.amplitude * spline.at(t).1,
         }
     }
 
     /// Returns the ratio of |F| at a tone's first extremum to that at the largest of its first three, which
-    /// are less than 1.2 periods apart; 1 for other pulses.
-    fn onset(&self) -> f64 {
-        if self.form.tone_cycles().is_none() {
-            return 1.0;
-        }
+    /// are less than 1.2 periods apart.
+    fn tone_onset(&self) -> f64 {
         // Between two zeros of the sine there is one extremum.
         let sizes = [0.0, 0.5, 1.0].map(|zero| {
             let period = 1.0 / self.center_frequency;
@@ -122,8 +144,12 @@ impl Pulse {
     /// The Laplace transforms ∫ F(t) exp(-s t) dt at s = `damping` + i 2π n / `period` for
     /// each n of `numbers`.
     ///
-    /// By quadrature: the pulse is smooth on its support, and no special function is needed.
+    /// That of a formula by quadrature: the pulse is smooth on its support, and no special function is needed.
     pub(crate) fn spectrum(&self, damping: f64, period: f64, numbers: &[usize]) -> Vec<Complex> {
+        if let Values::Samples(spline) = &self.values {
+            let at = |&n: &usize| Complex::new(damping, 2.0 * PI * n as f64 / period);
+            return numbers.iter().map(|n| spline.transform(at(n)).scale(self.amplitude)).collect();
+        }
         let last = numbers.iter().copied().max().unwrap_or(0);
         let length = self.length();
         let highest = 2.0 * PI * (last as f64 / period + self.center_frequency);
@@ -144,13 +170,16 @@ impl Pulse {
 /// Returns how much more gently the probe's pulse begins than the paper's: the ratio of their first extrema,
 /// each relative to its largest neighbour; at most 1.
 pub(crate) fn relative_onset(probe: &Probe) -> f64 {
-    let of = |form: PulseForm| Pulse { amplitude: 1.0, center_frequency: 1.0, form }.onset();
-    match probe.pulse.tone_cycles() {
-        Some(cycles) if cycles > 2.0 => {
-            (of(probe.pulse.clone()) / of(PulseForm::default())).min(1.0)
-        }
-        _ => 1.0,
-    }
+    let of_tone = |pulse: PulseForm| {
+        let probe = Probe { pulse, center_frequency: 1.0, ..Probe::default() };
+        Pulse::new(1.0, &probe).tone_onset()
+    };
+    let onset = match &probe.pulse {
+        &PulseForm::Tone { cycles } if cycles > 2.0 => of_tone(PulseForm::Tone { cycles }),
+        PulseForm::Samples(samples) => samples.onset(),
+        _ => return 1.0,
+    };
+    (onset / of_tone(PulseForm::Paper)).min(1.0)
 }
 
 /// Returns the distance from the middle of a tone, relative to half its length, and its rate per period.
@@ -161,34 +190,36 @@ fn tone_envelope(cycles: f64, periods: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use osteon_common::pulse::PulseShape;
+    use osteon_common::pulse_samples::PulseSamples;
 
     use super::*;
 
-    fn pulse(shape: PulseShape, cycles: f64) -> Pulse {
-        let probe = Probe { pulse: PulseForm { shape, cycles }, ..Probe::default() };
-        Pulse::new(100.0, &probe)
+    fn pulse(pulse: PulseForm) -> Pulse {
+        Pulse::new(100.0, &Probe { pulse, ..Probe::default() })
     }
 
-    fn all() -> [Pulse; 5] {
-        let tone = |cycles| pulse(PulseShape::Tone, cycles);
-        [
-            pulse(PulseShape::Paper, 3.0),
-            tone(1.0),
-            tone(2.5),
-            tone(6.0),
-            pulse(PulseShape::Ricker, 3.0),
-        ]
+    fn tone(cycles: f64) -> Pulse {
+        pulse(PulseForm::Tone { cycles })
+    }
+
+    fn formulas() -> [Pulse; 5] {
+        [pulse(PulseForm::Paper), tone(1.0), tone(2.5), tone(6.0), pulse(PulseForm::Ricker)]
+    }
+
+    /// Samples of the Ricker pulse at steps of 20 ns.
+    fn samples() -> PulseForm {
+        let ricker = pulse(PulseForm::Ricker);
+        let values: Vec<f64> = (1..180).map(|j| ricker.at(2e-8 * f64::from(j))).collect();
+        PulseForm::Samples(PulseSamples::new(2e-8, &values).unwrap())
     }
 
     #[test]
     fn main_extrema_are_where_the_formula_puts_them() {
-        let tone = |cycles| pulse(PulseShape::Tone, cycles);
         for (pulse, times) in [
-            (pulse(PulseShape::Paper, 3.0), &[0.359e-6, 0.791e-6, 1.209e-6, 1.641e-6][..]),
+            (pulse(PulseForm::Paper), &[0.359e-6, 0.791e-6, 1.209e-6, 1.641e-6][..]),
             (tone(1.0), &[0.353e-6, 0.647e-6]),
             (tone(5.0), &[0.317e-6, 0.803e-6]),
-            (pulse(PulseShape::Ricker, 3.0), &[0.86e-6, 1.25e-6, 1.64e-6]),
+            (pulse(PulseForm::Ricker), &[0.86e-6, 1.25e-6, 1.64e-6]),
         ] {
             for &t in times {
                 let slope = (pulse.at(t + 1e-9) - pulse.at(t - 1e-9)) / 2e-9;
@@ -201,22 +232,23 @@ mod tests {
     /// By an independent program, from the largest values in each half period.
     #[test]
     fn gentle_tones_lower_the_threshold() {
-        for (shape, cycles, expected) in [
-            (PulseShape::Paper, 3.0, 1.0),
-            (PulseShape::Tone, 1.0, 1.0),
-            (PulseShape::Tone, 3.0, 0.463_708_9),
-            (PulseShape::Tone, 5.0, 0.617_801_2),
-            (PulseShape::Tone, 6.0, 0.766_014_3),
-            (PulseShape::Ricker, 3.0, 1.0),
+        for (pulse, expected) in [
+            (PulseForm::Paper, 1.0),
+            (PulseForm::Tone { cycles: 1.0 }, 1.0),
+            (PulseForm::Tone { cycles: 3.0 }, 0.463_708_9),
+            (PulseForm::Tone { cycles: 5.0 }, 0.617_801_2),
+            (PulseForm::Tone { cycles: 6.0 }, 0.766_014_3),
+            (PulseForm::Ricker, 1.0),
+            (samples(), 1.0),
         ] {
-            let probe = Probe { pulse: PulseForm { shape, cycles }, ..Probe::default() };
-            assert!((relative_onset(&probe) - expected).abs() < 1e-6, "{shape:?} {cycles}");
+            let probe = Probe { pulse, ..Probe::default() };
+            assert!((relative_onset(&probe) - expected).abs() < 1e-6, "{:?}", probe.pulse);
         }
     }
 
     #[test]
     fn spectrum_is_forty_decibels_down_at_2_38_megahertz() {
-        let pulse = pulse(PulseShape::Paper, 3.0);
+        let pulse = pulse(PulseForm::Paper);
         let spectrum = pulse.spectrum(0.0, 50e-6, &(0..120).collect::<Vec<_>>());
         let peak = spectrum.iter().map(|z| z.abs()).fold(0.0, f64::max);
         let ratio = spectrum[119].abs() / peak;
@@ -227,7 +259,7 @@ mod tests {
     #[test]
     fn spectra_agree_with_fine_sums_of_values_and_slopes() {
         let (damping, period) = (1.2e6, 10e-6);
-        for pulse in all() {
+        for pulse in formulas().into_iter().chain([pulse(samples())]) {
             let spectrum = pulse.spectrum(damping, period, &(0..60).collect::<Vec<_>>());
             let largest = spectrum.iter().map(|z| z.abs()).fold(0.0, f64::max);
             let steps = 90_000;
@@ -254,7 +286,7 @@ mod tests {
 
     #[test]
     fn a_tone_of_two_cycles_is_the_papers_pulse_to_the_bit() {
-        let [paper, tone] = [pulse(PulseShape::Paper, 3.0), pulse(PulseShape::Tone, 2.0)];
+        let [paper, tone] = [pulse(PulseForm::Paper), tone(2.0)];
         assert_eq!((tone.length(), tone.extent()), (paper.length(), paper.extent()));
         for t in (0..400).map(|i| f64::from(i) * 11e-9) {
             let of = |pulse: Pulse| [pulse.at(t), pulse.slope_at(t)].map(f64::to_bits);
@@ -265,7 +297,7 @@ mod tests {
     /// Starts and ends are as small as they are documented, relative to the amplitude.
     #[test]
     fn pulses_end_where_they_are_cut() {
-        for pulse in all() {
+        for pulse in formulas().into_iter().chain([pulse(samples())]) {
             assert!(pulse.at(1e-300).abs() < 100.0 * 1e-5, "{pulse:?}");
             for (from, most) in [(pulse.extent(), 1e-10), (pulse.length(), 1e-20)] {
                 let beyond = (0..100).map(|i| from * (1.0 + 0.01 * f64::from(i)));

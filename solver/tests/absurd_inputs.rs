@@ -8,7 +8,7 @@ use osteon_common::elasticity::{Elasticity, EngineeringConstants};
 use osteon_common::layers::{Fluid, Layers};
 use osteon_common::parameters::Point;
 use osteon_common::probe::{Probe, Receivers, Source};
-use osteon_common::pulse::{PulseForm, PulseShape};
+use osteon_common::pulse::PulseForm;
 use osteon_common::realization::Ensemble;
 use osteon_common::sampling::{WaveSampling, pair_count};
 use osteon_common::violations::Violations;
@@ -46,9 +46,8 @@ fn largest_tilt(heights: (f64, f64), thickness: f64, row: (f64, f64, u32)) -> f6
 }
 
 fn pulse() -> impl Strategy<Value = PulseForm> {
-    let tone = (1.0..6.0).prop_map(|cycles| PulseForm { shape: PulseShape::Tone, cycles });
-    let ricker = PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() };
-    prop_oneof![2 => Just(PulseForm::default()), 1 => tone, 1 => Just(ricker)]
+    let tone = (1.0..6.0).prop_map(|cycles| PulseForm::Tone { cycles });
+    prop_oneof![2 => Just(PulseForm::default()), 1 => tone, 1 => Just(PulseForm::Ricker)]
 }
 
 /// Receivers from 1 mm to 50 mm, rarely much nearer, up to 64 of them, up to 10 mm apart.

@@ -5,7 +5,7 @@
 use osteon_common::bone::{Sublayer, Sublayers};
 use osteon_common::case::Setup;
 use osteon_common::parameters::Point;
-use osteon_common::pulse::{PulseForm, PulseShape};
+use osteon_common::pulse::PulseForm;
 use osteon_common::realization::Ensemble;
 use osteon_solver::{Isa, Solver, Workspace};
 
@@ -63,7 +63,7 @@ fn and_with_a_tilted_probe_in_both_directions() {
 #[test]
 fn and_with_another_pulse_and_wide_elements() {
     let change = |setup: &mut Setup| {
-        setup.probe.pulse = PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() };
+        setup.probe.pulse = PulseForm::Ricker;
         setup.probe.element_width = 0.5e-3;
         setup.probe.tilt = 0.02;
     };

@@ -100,7 +100,8 @@ fn moments_over_random_setups_are_those_of_quadrature_over_fixed_ones() {
     let PorosityProfile { sublayers, .. } = PorosityProfile::default();
     let (surface, marrow) = (Some(0.05), Some(0.15));
     let shape = ProfileShape::Endosteal;
-    setup.pores.profile = PorosityProfile { surface, marrow, shape, sublayers };
+    setup.pores.profile =
+        PorosityProfile { surface, marrow, shape, sublayers, ..PorosityProfile::default() };
     check(SetupQuantity::SurfacePorosity, &setup, 0.01, 1e-5);
     check(SetupQuantity::MarrowPorosity, &setup, 0.02, 1e-5);
 }

@@ -1,7 +1,7 @@
 //! Rules on the pores of a job's bone.
 
 use crate::parameters::Parameter;
-use crate::pores::{Pores, PorosityProfile};
+use crate::pores::{Pores, PorosityProfile, ProfileShape, SUBLAYERS};
 use crate::porosity::PorosityModel;
 use crate::setup_quantity::SetupQuantity;
 use crate::violations::Violations;
@@ -17,11 +17,11 @@ pub(super) fn pores(pores: &Pores, violations: &mut Violations) {
         porosity(porosity_key, value, violations);
     }
     porosity_profile(porosity_key, &pores.profile, violations);
-    let PorosityProfile { surface, marrow, .. } = pores.profile;
+    let PorosityProfile { surface, marrow, .. } = &pores.profile;
     let given = [
         (SetupQuantity::Porosity, pores.porosity),
-        (SetupQuantity::SurfacePorosity, surface),
-        (SetupQuantity::MarrowPorosity, marrow),
+        (SetupQuantity::SurfacePorosity, *surface),
+        (SetupQuantity::MarrowPorosity, *marrow),
     ];
     for (quantity, value) in given {
         // 0 is refused, too: a job without pores leaves the key out.
@@ -29,7 +29,8 @@ pub(super) fn pores(pores: &Pores, violations: &mut Violations) {
             number(quantity.mean_key(), value, Parameter::Porosity.row().accepted, violations);
         }
     }
-    if pores.porosity.is_some() && (surface.is_some() || marrow.is_some()) {
+    let has_profile = surface.is_some() || marrow.is_some() || !pores.profile.values.is_empty();
+    if pores.porosity.is_some() && has_profile {
         let message = "is given together with a profile, which has porosities of its own; give one \
                        porosity, or a profile";
         violations.add(porosity_key, message);
@@ -44,8 +45,11 @@ pub(super) fn pores(pores: &Pores, violations: &mut Violations) {
 
 /// Records all violations of a profile, which is the table `name` of a file.
 pub fn porosity_profile(name: &str, profile: &PorosityProfile, violations: &mut Violations) {
-    let (mut checked, mut default) = (*profile, PorosityProfile::default());
+    let (mut checked, mut default) = (profile.clone(), PorosityProfile::default());
     section(name, &mut checked, &mut default, violations);
+    if profile.shape == ProfileShape::Table {
+        return table(name, profile, violations);
+    }
     let missing = match (profile.surface, profile.marrow) {
         (Some(_), None) => "marrow",
         (None, Some(_)) => "surface",
@@ -54,5 +58,22 @@ pub fn porosity_profile(name: &str, profile: &PorosityProfile, violations: &mut 
     let field = format!("{name}.{missing}");
     if !known_wrong(&field, violations) {
         violations.add(field, "is missing; a profile has surface and marrow");
+    }
+}
+
+/// Checks the profile of a table, which has values and no ends.
+fn table(name: &str, profile: &PorosityProfile, violations: &mut Violations) {
+    let field = format!("{name}.values");
+    let count = profile.values.len() as u64;
+    if !SUBLAYERS.contains(count) && !known_wrong(&field, violations) {
+        violations.add(field, format!("has {count} porosities; it must have {SUBLAYERS}"));
+    }
+    for (end, value) in [("surface", profile.surface), ("marrow", profile.marrow)] {
+        let field = format!("{name}.{end}");
+        if value.is_some() && !known_wrong(&field, violations) {
+            let message = "belongs to the shapes \"linear\" and \"endosteal\"; a table has all porosities in \
+                           `values`: leave it out";
+            violations.add(field, message);
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Checks the declared keys of a section, each by itself.
 
-use crate::accepted::WholeRange;
+use crate::accepted::{Interval, WholeRange};
 use crate::field_path::{element_path, entry_path};
 use crate::fields::{
     Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, List, Number, Section, Whole,
@@ -8,7 +8,7 @@ use crate::fields::{
 };
 use crate::violations::Violations;
 
-use super::value::{known_wrong, number, quantity, whole};
+use super::value::{elements, known_wrong, number, quantity, whole};
 
 /// Records each key of `section`, which is the table `name` of a file, whose value is not accepted
 /// or in another unit. Keys that are not meaningful must have the values that they have in
@@ -94,6 +94,15 @@ impl Fields for Checker<'_> {
             let path = element_path(&list, index);
             field.element(index).declare(&mut Checker { path, violations: self.violations });
         }
+    }
+
+    fn numbers(&mut self, key: Key, field: &mut Vec<f64>, accepted: Interval, max: usize) {
+        let path = entry_path(&self.path, key.name);
+        if field.len() > max {
+            let message = format!("has {} elements; at most {max} are accepted", field.len());
+            return self.violations.add(path, message);
+        }
+        elements(&path, field, (accepted, "numbers"), self.violations);
     }
 
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {

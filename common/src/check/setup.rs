@@ -10,6 +10,7 @@ use crate::settings::Method;
 use crate::violations::Violations;
 
 use super::pores::pores;
+use super::pulse::pulse;
 use super::section::section;
 use super::value::{known_wrong, quantity};
 
@@ -24,6 +25,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
         section(key.name, declared, default, violations);
     }
     pores(&setup.pores, violations);
+    pulse(&setup.probe, violations);
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);
     element_width(setup, violations);

@@ -1,6 +1,6 @@
 //! The declared keys of a section with their values, as a list.
 
-use crate::accepted::WholeRange;
+use crate::accepted::{Interval, WholeRange};
 
 use super::{Choice, Condition, Fields, Key, List, Number, Section, Whole};
 
@@ -9,7 +9,7 @@ use super::{Choice, Condition, Fields, Key, List, Number, Section, Whole};
 pub struct DeclaredKey {
     /// Name and meaning.
     pub key: Key,
-    /// DeclaredValue, and the values that are accepted.
+    /// The value, and the values that are accepted.
     pub value: DeclaredValue,
     /// Condition under which the key is meaningful, if it has one.
     pub condition: Option<Condition>,
@@ -40,6 +40,15 @@ pub enum DeclaredValue {
         /// Keys that every element has, with any values.
         keys: Vec<DeclaredKey>,
         /// Largest number of elements.
+        max: usize,
+    },
+    /// A list of numbers, empty if it is absent.
+    Numbers {
+        /// The numbers.
+        values: Vec<f64>,
+        /// The numbers that are accepted.
+        accepted: Interval,
+        /// Largest number of them.
         max: usize,
     },
     /// A table that has code of its own.
@@ -119,6 +128,10 @@ impl Fields for Collector {
         let elements = (0..field.len()).map(|index| entries(field.element(index))).collect();
         let keys = entries(&mut *field.example());
         self.push(key, DeclaredValue::List { elements, keys, max: field.max() });
+    }
+
+    fn numbers(&mut self, key: Key, field: &mut Vec<f64>, accepted: Interval, max: usize) {
+        self.push(key, DeclaredValue::Numbers { values: field.clone(), accepted, max });
     }
 
     fn only_if(&mut self, condition: &Condition, declare: &mut dyn FnMut(&mut dyn Fields)) {

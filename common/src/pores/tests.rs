@@ -7,8 +7,9 @@ fn matrix() -> Point {
 }
 
 fn profile(surface: f64, marrow: f64, shape: ProfileShape, sublayers: u32) -> Pores {
+    let (surface, marrow) = (Some(surface), Some(marrow));
     let profile =
-        PorosityProfile { surface: Some(surface), marrow: Some(marrow), shape, sublayers };
+        PorosityProfile { surface, marrow, shape, sublayers, ..PorosityProfile::default() };
     Pores { profile, ..Pores::default() }
 }
 
@@ -16,7 +17,7 @@ fn profile(surface: f64, marrow: f64, shape: ProfileShape, sublayers: u32) -> Po
 fn sublayers_have_the_porosity_at_their_middle() {
     let check = |shape, sublayers, expected: &[f64]| {
         let Pores { profile, .. } = profile(0.05, 0.15, shape, sublayers);
-        let found = profile.of_sublayers(profile.ends().unwrap());
+        let found = profile.of_sublayers().unwrap();
         assert_eq!(found.len(), expected.len());
         for (found, expected) in found.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-15, "{found} {expected}");
@@ -25,6 +26,18 @@ fn sublayers_have_the_porosity_at_their_middle() {
     check(ProfileShape::Linear, 2, &[0.075, 0.125]);
     check(ProfileShape::Linear, 4, &[0.0625, 0.0875, 0.1125, 0.1375]);
     check(ProfileShape::Endosteal, 4, &[0.05, 0.15]);
+}
+
+#[test]
+fn a_table_has_its_porosities_and_their_mean() {
+    let values = vec![0.04, 0.05, 0.3];
+    let profile =
+        PorosityProfile { shape: ProfileShape::Table, values, ..PorosityProfile::default() };
+    assert_eq!(profile.of_sublayers(), Some(vec![0.04, 0.05, 0.3]));
+    let pores = Pores { profile, ..Pores::default() };
+    assert!((pores.mean_porosity().unwrap() - 0.13).abs() < 1e-15);
+    let none = PorosityProfile { shape: ProfileShape::Table, ..PorosityProfile::default() };
+    assert_eq!((none.is_given(), none.of_sublayers()), (false, None));
 }
 
 #[test]

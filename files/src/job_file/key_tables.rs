@@ -116,6 +116,9 @@ fn allowed(value: &DeclaredValue) -> String {
             names.iter().map(|name| format!("`\"{name}\"`")).collect::<Vec<_>>().join(" or ")
         }
         DeclaredValue::List { max, .. } => format!("a list of 1 to {max} tables"),
+        DeclaredValue::Numbers { accepted, max, .. } => {
+            format!("a list of at most {max} numbers, each {accepted}")
+        }
         DeclaredValue::Table(_) | DeclaredValue::CustomTable => String::new(),
     }
 }

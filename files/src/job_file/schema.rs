@@ -8,9 +8,11 @@ use osteon_common::observables::Observable;
 use osteon_common::parameters::Parameter;
 use osteon_common::pores::{Pores, PorosityProfile};
 use osteon_common::porosity::{POROSITY, PorosityModel};
+use osteon_common::pulse::{PulseForm, TONE_CYCLES};
+use osteon_common::pulse_samples::{SAMPLES, STEP};
 use serde_json::{Map, Value as Json, json};
 
-use crate::materials;
+use crate::{materials, pulse};
 
 use super::csv_format::{LINES, MISSING_MAX};
 use super::data_section::GROUP_COLUMNS_MAX;
@@ -26,6 +28,7 @@ pub fn schema() -> String {
     for (key, section) in setup.sections() {
         properties.insert(key.name.to_owned(), described(table(&entries(section)), key));
     }
+    properties["probe"]["properties"][PulseForm::KEY.name] = described(pulse(), PulseForm::KEY);
     properties.insert(Pores::KEY.name.to_owned(), described(pores(), Pores::KEY));
     let data_key = Key { name: "data", meaning: "measured velocities, or their moments" };
     properties.insert(data_key.name.to_owned(), described(data(), data_key));
@@ -74,6 +77,9 @@ fn property(DeclaredKey { key, value, condition }: &DeclaredKey) -> Json {
         DeclaredValue::Choice { chosen, names } => json!({ "enum": names, "default": chosen }),
         DeclaredValue::Table(entries) => table(entries),
         DeclaredValue::List { keys, max, .. } => list(key.name, keys, *max),
+        DeclaredValue::Numbers { accepted, max, .. } => {
+            json!({ "type": "array", "items": number(None, *accepted), "maxItems": max })
+        }
         DeclaredValue::CustomTable => object(json!({})),
     };
     let only = condition.as_ref().map(|condition| format!("only {}: ", condition.description));
@@ -123,10 +129,31 @@ fn said_to_be(mut schema: Json, meaning: &str) -> Json {
     schema
 }
 
+fn pulse() -> Json {
+    let names = PulseForm::NAMED.map(|(name, _)| name);
+    let [tone, file, step, samples] = pulse::KEYS;
+    let all = json!({
+        "type": "array",
+        "items": { "type": "number" },
+        "minItems": SAMPLES.min,
+        "maxItems": SAMPLES.max,
+    });
+    let values = [
+        (tone, number(None, TONE_CYCLES)),
+        (file, json!({ "type": "string" })),
+        (step, number(None, STEP)),
+        (samples, all),
+    ];
+    let properties = values.map(|(key, schema)| (key.name.to_owned(), described(schema, key)));
+    let mut table = object(properties.into_iter().collect::<Map<_, _>>().into());
+    table["minProperties"] = 1.into();
+    json!({ "anyOf": [{ "enum": names }, table] })
+}
+
 fn pores() -> Json {
     let one = number(None, Parameter::Porosity.row().accepted);
     let mut profile = table(&entries(&mut PorosityProfile::default()));
-    profile["required"] = json!(["surface", "marrow"]);
+    profile["anyOf"] = json!([{ "required": ["surface", "marrow"] }, { "required": ["values"] }]);
     let model = described(table(&entries(&mut PorosityModel::default())), PorosityModel::KEY);
     let porosity = described(json!({ "anyOf": [one, profile] }), POROSITY);
     object(json!({ POROSITY.name: porosity, PorosityModel::KEY.name: model }))

@@ -3,8 +3,8 @@
 
 use osteon_common::field_path::element_path;
 use osteon_common::fields::{
-    self, Choice, Condition, DeclaredKey, DeclaredValue, Fields, Key, List, Number, Section, Whole,
-    WholeRange,
+    self, Choice, Condition, DeclaredKey, DeclaredValue, Fields, Interval, Key, List, Number,
+    Section, Whole, WholeRange,
 };
 
 use super::{Reader, Table};
@@ -81,6 +81,15 @@ impl Fields for TableReader<'_, '_> {
                 require(self.reader, &table, &keys);
             }
             field.element(index).declare(&mut TableReader { reader: self.reader, table });
+        }
+    }
+
+    fn numbers(&mut self, key: Key, field: &mut Vec<f64>, _: Interval, max: usize) {
+        let expected = format!("a list of at most {max} numbers");
+        let path = self.table.path(key.name);
+        let Some(nodes) = self.reader.list(&self.table, key.name, &expected) else { return };
+        if let Some(numbers) = self.reader.numbers(&path, nodes) {
+            *field = numbers;
         }
     }
 

@@ -59,8 +59,8 @@ fn a_posterior_needs_two_realizations() {
             edited(sampling, "realizations = 1").replace("\"simplex\"", &format!("\"{method}\""));
         assert_eq!(
             refusal(&format!("{text}\n{section}"), JobKind::Identification),
-            "1 error\n  line 73: monte_carlo.realizations: is 1; a posterior needs the law of \
-             velocities that differ, so at least 2"
+            "1 error\n  line 73: monte_carlo.realizations: is 1; a posterior needs the \
+             distribution of the velocities, hence at least 2 realizations"
         );
     }
 }

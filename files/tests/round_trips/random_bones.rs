@@ -18,11 +18,21 @@ pub(super) fn pores() -> impl Strategy<Value = Pores> {
                 pores.porosity = Some(one);
                 return pores;
             }
-            let profile =
-                PorosityProfile { surface: Some(one), marrow: Some(other), shape, sublayers };
+            let profile = PorosityProfile {
+                surface: Some(one),
+                marrow: Some(other),
+                shape,
+                sublayers,
+                ..PorosityProfile::default()
+            };
             pores.profile = match shape {
                 ProfileShape::Linear => profile,
                 ProfileShape::Endosteal => PorosityProfile { sublayers: 6, ..profile },
+                ProfileShape::Table => PorosityProfile {
+                    shape,
+                    values: vec![one, other, one],
+                    ..PorosityProfile::default()
+                },
             };
             pores
         },

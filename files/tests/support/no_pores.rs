@@ -10,6 +10,7 @@ pub(crate) const NO_PORES: Pores = Pores {
         marrow: None,
         shape: ProfileShape::Linear,
         sublayers: 6,
+        values: Vec::new(),
     },
     model: PorosityModel {
         homogenisation: Homogenisation::MoriTanaka,

@@ -1,7 +1,7 @@
 //! Random attenuations and pulses of a setup.
 
 use osteon_common::attenuation::Attenuation;
-use osteon_common::pulse::{PulseForm, PulseShape};
+use osteon_common::pulse::PulseForm;
 use proptest::prelude::*;
 
 pub(crate) fn attenuation() -> impl Strategy<Value = Attenuation> {
@@ -15,10 +15,9 @@ pub(crate) fn attenuation() -> impl Strategy<Value = Attenuation> {
 
 /// Returns a tone.
 pub(crate) fn tone(cycles: f64) -> PulseForm {
-    PulseForm { shape: PulseShape::Tone, cycles }
+    PulseForm::Tone { cycles }
 }
 
 pub(crate) fn pulse_form() -> impl Strategy<Value = PulseForm> {
-    let ricker = PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() };
-    prop_oneof![Just(PulseForm::default()), (1.0..6.0).prop_map(tone), Just(ricker)]
+    prop_oneof![Just(PulseForm::default()), (1.0..6.0).prop_map(tone), Just(PulseForm::Ricker)]
 }

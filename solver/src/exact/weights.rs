@@ -102,7 +102,7 @@ pub(super) fn unreliable_pick_weight(
     }
     let threshold = picking::criterion(&prepared.setup).threshold;
     let (ratio, skipped) = (found.pick.ratio / threshold, found.pick.skipped / threshold);
-    rise(delay * fc - prepared.setup.probe.pulse.delay(), LATE)
+    rise(delay * fc - prepared.setup.probe.pulse.delay(fc), LATE)
         .max(rise(found.pick.residual * fc, OFF_LINE))
         .max(rise(skipped, NEARLY_PICKED))
         .max(1.0 - rise(margin * fc, NEAR_DIRECT_WAVE))

@@ -10,7 +10,8 @@ use osteon_common::moments::Moments;
 use osteon_common::parameters::extended;
 use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
 use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
-use osteon_common::pulse::{PulseForm, PulseShape};
+use osteon_common::pulse::PulseForm;
+use osteon_common::pulse_samples::PulseSamples;
 use osteon_common::random_quantities::{RandomDistribution, Scatter};
 use osteon_common::settings::{Method, SolverSettings};
 use proptest::prelude::*;
@@ -151,14 +152,17 @@ fn pores() -> impl Strategy<Value = Pores> {
             let default = PorosityProfile::default();
             let sublayers =
                 if shape == ProfileShape::Linear { sublayers } else { default.sublayers };
-            let (surface, marrow) = (Some(surface), Some(marrow));
+            let is_table = shape == ProfileShape::Table;
+            let values = if is_table { vec![surface, marrow, surface] } else { Vec::new() };
+            let end = |value| Some(value).filter(|_| !is_table);
+            let [surface, marrow] = [surface, marrow].map(end);
             match is_profile {
                 true => Pores {
                     porosity: None,
-                    profile: PorosityProfile { surface, marrow, shape, sublayers },
+                    profile: PorosityProfile { surface, marrow, shape, sublayers, values },
                     model,
                 },
-                false => Pores { porosity: surface, profile: default, model },
+                false => Pores { porosity: Some(0.1), profile: default, model },
             }
         },
     )
@@ -170,6 +174,13 @@ fn setup() -> impl Strategy<Value = Setup> {
         .prop_map(|(setup, pores)| Setup { pores: pores.unwrap_or_default(), ..setup })
 }
 
+/// A peak and a trough of about 1 MHz.
+fn samples() -> PulseForm {
+    let value = |t: f64| (6.3 * t).sin() * (-4.0 * (t - 1.0) * (t - 1.0)).exp();
+    let values: Vec<f64> = (1..40).map(|j| value(0.05 * f64::from(j))).collect();
+    PulseForm::Samples(PulseSamples::new(5e-8, &values).unwrap())
+}
+
 fn layered() -> impl Strategy<Value = Setup> {
     let exact = (0.5..1.5, proptest::option::of(2.0..99.0)).prop_map(|(refinement, quality)| {
         let mut setup = Setup::default();
@@ -179,8 +190,9 @@ fn layered() -> impl Strategy<Value = Setup> {
         setup.probe.element_width = 1e-4 * refinement;
         setup.probe.guided_wave_frequency = quality.map(|quality| 1e4 * quality);
         setup.probe.pulse = match quality {
-            Some(_) => PulseForm { shape: PulseShape::Tone, cycles: 4.0 * refinement },
-            None => PulseForm { shape: PulseShape::Ricker, ..PulseForm::default() },
+            Some(_) => PulseForm::Tone { cycles: 4.0 * refinement },
+            None if refinement < 1.0 => PulseForm::Ricker,
+            None => samples(),
         };
         setup
     });
