@@ -133,3 +133,58 @@ fn a_stack_of_fluids_is_refused_with_what_to_do() {
     assert!(!out.exists());
     run(&arguments).succeeded();
 }
+
+/// The faces of a bone in a vacuum are free, and those in fluids are not pressed sideways.
+#[test]
+fn shapes_are_a_row_for_each_depth() {
+    let scratch = Scratch::new();
+    let case = example("A.toml");
+    let made = |name: &str, more: &[&str]| {
+        let out = scratch.path(name);
+        let all = [&["modes", &case, "--out", text(&out), "--frequencies", "2e5:4e5:2"], more];
+        run(&all.concat()).succeeded();
+        let numbers = |row: Vec<String>| {
+            let parsed = row[4..].iter().map(|field| field.parse::<f64>().unwrap());
+            (row[1].clone(), parsed.collect::<Vec<f64>>())
+        };
+        let waves = rows(&out.join("modes.csv")).len();
+        let rows = rows(&out.join("shapes.csv")).into_iter().map(numbers);
+        (waves, rows.collect::<Vec<_>>())
+    };
+    let (waves, shapes) = made("free", &["--shapes=5"]);
+    assert_eq!(shapes.len(), 5 * waves);
+    for wave in shapes.chunks(5) {
+        let depths: Vec<f64> = wave.iter().map(|(_, numbers)| numbers[1]).collect();
+        assert_eq!(depths, [0.0, 1e-3, 2e-3, 3e-3, 4e-3]);
+        let [upper, lower] = [0, 4].map(|place| &wave[place].1);
+        assert!(upper[8..].iter().chain(&lower[8..]).all(|stress| *stress == 0.0), "{wave:?}");
+        // u3 is the same on both faces where the wave bends the bone.
+        let sign = if wave[0].0.starts_with('A') { 1.0 } else { -1.0 };
+        assert_eq!([upper[6], upper[7]], [sign * lower[6], sign * lower[7]], "{wave:?}");
+    }
+    let (waves, shapes) = made("fluids", &["--shapes", "--in-fluids"]);
+    assert_eq!(shapes.len(), 41 * waves);
+    for wave in shapes.chunks(41).filter(|wave| wave[0].0 == "A0") {
+        let upper = &wave[0].1;
+        let [across, along] = [12, 8].map(|at| upper[at].hypot(upper[at + 1]));
+        assert!(across > 1e6 && along < 1e-9 * across, "{upper:?}");
+    }
+}
+
+#[test]
+fn shapes_that_cannot_be_meant_are_refused() {
+    let scratch = Scratch::new();
+    let (case, out) = (example("A.toml"), scratch.path("modes"));
+    let check = |more: &[&str], reason: &str| {
+        let refused = run(&[&["modes", &case], more].concat());
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        let words: Vec<&str> = refused.stderr.split_whitespace().collect();
+        assert!(words.join(" ").contains(reason), "{refused:?}");
+        assert!(!out.exists());
+    };
+    check(&["--shapes"], "--out <DIR>");
+    let out_too = ["--out", text(&out)];
+    check(&[&out_too[..], &["--shapes=1"]].concat(), "1 is not in 2..=1001");
+    let many = ["--shapes=1001", "--frequencies", "5e5:1e6:300"];
+    check(&[&out_too[..], &many].concat(), "give fewer frequencies or depths");
+}

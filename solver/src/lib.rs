@@ -34,7 +34,9 @@ mod vector;
 
 pub use arrival::{Arrival, PassSummary, Sampled};
 pub use complex::Complex;
-pub use exact::guided::{FluidModes, GuidedWave, GuidedWaves, Mode, ModesError};
+pub use exact::guided::{
+    FluidModes, GuidedWave, GuidedWaves, Mode, ModeShape, ModesError, ShapeError, ShapePoint,
+};
 #[cfg(feature = "measure")]
 pub use exact::quantities::{admittance, fastest_wave, pressure};
 #[cfg(feature = "measure")]

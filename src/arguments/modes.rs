@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use osteon_local::frequency_band::FrequencyBand;
+use osteon_local::shapes::DEPTHS_MAX;
 
 use super::CaseFileArguments;
 
@@ -21,6 +22,11 @@ pub(crate) struct ModesArguments {
     /// layers, instead of those in a vacuum
     #[arg(long)]
     pub(crate) in_fluids: bool,
+    /// Also write shapes.csv: displacements and stresses of each wave at N depths from the upper face of the
+    /// bone to the lower one [default: 41]
+    #[arg(long, value_name = "N", requires = "out", num_args = 0..=1, require_equals = true)]
+    #[arg(default_missing_value = "41", value_parser = clap::value_parser!(u32).range(2..=DEPTHS_MAX.into()))]
+    pub(crate) shapes: Option<u32>,
     /// Number of threads to compute on [default: all cores]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) threads: Option<u32>,

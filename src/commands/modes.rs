@@ -6,6 +6,7 @@ use osteon_common::warnings::case_warnings;
 use osteon_files::case_file;
 use osteon_local::frequency_band::FrequencyBand;
 use osteon_local::modes::{BandModes, BandModesError, BoneSurroundings};
+use osteon_local::shapes::{BandShapes, BandShapesError};
 use osteon_solver::{Isa, ModesError};
 
 use crate::arguments::ModesArguments;
@@ -17,18 +18,19 @@ use crate::resolved;
 use crate::warnings;
 use crate::wings::dispersion_figure;
 
-/// The file of the waves, and of their figure.
+/// The files of the waves, of their figure, and of their shapes.
 const TABLE: &str = "modes.csv";
 const FIGURE: &str = "modes.svg";
+const SHAPES: &str = "shapes.csv";
 
 /// Computes the waves, writes their files if requested, and prints them.
 pub(super) async fn modes(arguments: ModesArguments, isa: Isa, cores: u32) -> Ended {
-    let ModesArguments { case, frequencies, in_fluids, threads, out, json } = arguments;
+    let ModesArguments { case, frequencies, in_fluids, shapes, threads, out, json } = arguments;
     let input = case.open().map_err(CommandFailure::bad_input)?;
     let case = case_file::of_input(&input).map_err(CommandFailure::bad_input)?;
     warnings::say_all(&case_warnings(&case));
     if let Some(directory) = &out {
-        for name in [TABLE, FIGURE] {
+        for name in [TABLE, FIGURE, SHAPES] {
             new_files::refuse_existing(&directory.join(name))?;
         }
     }
@@ -36,25 +38,42 @@ pub(super) async fn modes(arguments: ModesArguments, isa: Isa, cores: u32) -> En
     let frequencies = frequencies.unwrap_or(center).frequencies();
     let threads = threads.unwrap_or(cores) as usize;
     let surroundings = if in_fluids { BoneSurroundings::Fluids } else { BoneSurroundings::Vacuum };
-    let compute = move || BandModes::compute(&case, surroundings, &frequencies, isa, threads);
+    let compute = move || -> Result<_, CommandFailure> {
+        let modes = BandModes::compute(&case, surroundings, &frequencies, isa, threads);
+        let modes = modes.map_err(modes_failure)?;
+        let shapes = shapes.map(|depths| BandShapes::compute(&case, &modes, depths, isa, threads));
+        let shapes = shapes.transpose().map_err(|error| match error {
+            BandShapesError::TooMany { .. } => CommandFailure::bad_input(error),
+            _ => CommandFailure::failed(error),
+        })?;
+        Ok((modes, shapes))
+    };
     let computed = tokio::task::spawn_blocking(compute).await.map_err(CommandFailure::failed)?;
-    let modes = computed.map_err(|error| match error {
-        BandModesError::Modes(
-            ModesError::TooLow { .. }
-            | ModesError::TooMany { .. }
-            | ModesError::SeveralFluids { .. },
-        ) => CommandFailure::bad_input(error),
-        _ => CommandFailure::failed(error),
-    })?;
+    let (modes, shapes) = computed?;
     if let Some(directory) = &out {
-        write(directory, &modes)?;
+        write(directory, &modes, shapes.as_ref())?;
     }
     let shown = ShownModes { modes: &modes, directory: out.as_deref() };
     output::stdout(resolved::format(json)).modes(&shown).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
 }
 
-fn write(directory: &Path, modes: &BandModes) -> Result<(), CommandFailure> {
+fn modes_failure(error: BandModesError) -> CommandFailure {
+    match error {
+        BandModesError::Modes(
+            ModesError::TooLow { .. }
+            | ModesError::TooMany { .. }
+            | ModesError::SeveralFluids { .. },
+        ) => CommandFailure::bad_input(error),
+        _ => CommandFailure::failed(error),
+    }
+}
+
+fn write(
+    directory: &Path,
+    modes: &BandModes,
+    shapes: Option<&BandShapes>,
+) -> Result<(), CommandFailure> {
     new_files::directory(directory)?;
     let file = |name: &str, text: String| NewFile {
         path: directory.join(name),
@@ -62,6 +81,8 @@ fn write(directory: &Path, modes: &BandModes) -> Result<(), CommandFailure> {
         secret: false,
     };
     let figure = dispersion_figure(&modes.points()).map(|svg| file(FIGURE, svg));
-    let files: Vec<NewFile> = [file(TABLE, modes.to_csv())].into_iter().chain(figure).collect();
+    let shapes = shapes.map(|shapes| file(SHAPES, shapes.to_csv()));
+    let table = file(TABLE, modes.to_csv());
+    let files: Vec<NewFile> = [table].into_iter().chain(figure).chain(shapes).collect();
     new_files::create(&files)
 }

@@ -13,6 +13,7 @@
 //! Within a family none cross but by accident, so that a wave followed from low frequencies keeps its
 //! place in the order.
 
+mod banded;
 mod complex_plate;
 mod contour;
 mod count;
@@ -23,6 +24,8 @@ mod fluid_bone;
 mod fluid_modes;
 mod free_bone;
 mod modes;
+mod section;
+mod shape;
 mod stack;
 
 use std::f64::consts::TAU;
@@ -37,6 +40,7 @@ use crate::solver::Solver;
 pub use self::fluid_modes::FluidModes;
 pub use self::free_bone::GuidedWave;
 pub use self::modes::{Mode, ModesError};
+pub use self::shape::{ModeShape, ShapeError, ShapePoint};
 
 /// Least products of thickness and wavenumber: below them, rounding of the stiffness hides that of bending,
 /// which is their fourth power, or of extension, their square.

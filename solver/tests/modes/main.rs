@@ -9,6 +9,7 @@ mod free;
 mod fundamental;
 mod published;
 mod rayleigh_lamb;
+mod shapes;
 
 use osteon_common::bone::{Bone, Sublayer, Sublayers};
 use osteon_common::case::Setup;

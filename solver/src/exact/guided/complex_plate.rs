@@ -1,9 +1,10 @@
 //! The dynamic stiffness of a bone at a complex wavenumber.
 //!
-//! `[t_top; t_bottom] = K [u_top; u_bottom]` as in [`crate::exact::layer`], for fields ∝ exp(st - ikx1) with any
-//! s and k. With Y the block of the transfer matrix from the tractions at the bottom to the displacements on top,
-//! det(K) det(Y) is an analytic function of k without poles: det(Y) is zero where a wave fits between clamped
-//! faces, where K is infinite. It is multiplied up while layers are put together.
+//! `[t_top; t_bottom] = K [u_top; u_bottom]` as in [`crate::exact::layer`], for fields ∝ exp(st + ikx1) with
+//! any s and k; the determinant below is the same for -k. With Y the block of the transfer matrix from the
+//! tractions at the bottom to the displacements on top, det(K) det(Y) is an analytic function of k without
+//! poles: det(Y) is zero where a wave fits between clamped faces, where K is infinite. It is multiplied up
+//! while layers are put together.
 
 use super::dense::{
     ComplexMatrix3, Scaled, UNIT, ZERO, determinant, inverse, minus_product, product,
@@ -17,7 +18,7 @@ use crate::vector::Vector;
 /// Number of terms of a slice's exponential series; with [`THICKEST`], the rest is below 1e-17.
 const TERMS: usize = 24;
 /// Largest growth or phase of waves across a slice.
-const THICKEST: f64 = 1.0;
+pub(super) const THICKEST: f64 = 1.0;
 /// Maximum number of doublings.
 const DOUBLINGS_MAX: u32 = 40;
 
@@ -149,8 +150,7 @@ fn layer_stiffness(
     k: Complex,
 ) -> LayerStiffness {
     let MediumLayer { medium, thickness } = layer;
-    let coupling = medium.coupling.iter().flatten().fold(0.0_f64, |max, p| max.max(p.abs()));
-    let growth = (1.0 + coupling) * k.abs() + s.abs() / medium.slowest_across();
+    let growth = growth(medium, s, k);
     let (mut slice, mut doublings) = (*thickness, 0);
     while growth * slice > THICKEST && doublings < DOUBLINGS_MAX {
         slice *= 0.5;
@@ -161,6 +161,13 @@ fn layer_stiffness(
         stiffness = stiffness.on(&stiffness, components);
     }
     stiffness
+}
+
+/// Returns a bound of the growth or phase of waves for each metre across a medium, rad/m.
+#[inline(always)]
+pub(super) fn growth(medium: &Medium, s: Complex, k: Complex) -> f64 {
+    let coupling = medium.coupling.iter().flatten().fold(0.0_f64, |max, p| max.max(p.abs()));
+    (1.0 + coupling) * k.abs() + s.abs() / medium.slowest_across()
 }
 
 /// Returns the stiffness of a thin slice from its transfer matrix [X, Y; W, V], from the bottom to the top:
@@ -197,7 +204,7 @@ fn slice_stiffness(
 
 /// Returns the blocks X, Y, W and V of exp(M d) by its series; tractions are in units of stiffness / d.
 #[inline(always)]
-fn transfer(medium: &Medium, s: Complex, k: Complex, slice: f64) -> [ComplexMatrix3; 4] {
+pub(super) fn transfer(medium: &Medium, s: Complex, k: Complex, slice: f64) -> [ComplexMatrix3; 4] {
     let kappa = Complex::new(k.im, -k.re).scale(slice);
     let sigma = (s * s).scale(medium.density * slice * slice / medium.stiffness);
     let square = kappa * kappa;

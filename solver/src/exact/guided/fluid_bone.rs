@@ -51,6 +51,14 @@ pub(super) struct FluidBone<'a> {
 impl FluidBone<'_> {
     /// Returns a function of k (rad/m) without poles that is zero where the bone has a wave.
     pub(super) fn determinant(&self, k: Complex) -> Scaled {
+        let (lossless, loads) = self.loads(k);
+        let Self { isa, media, components, .. } = *self;
+        isa.run(WaveDeterminant { media, components, s: lossless.bone, k, loads })
+    }
+
+    /// Returns the frequencies at which the layers have no loss, and what answers displacements across both
+    /// faces there, Pa/m.
+    pub(super) fn loads(&self, k: Complex) -> (LosslessFrequencies, [Complex; 2]) {
         let s = Complex::new(0.0, self.omega);
         let lossless = LosslessFrequencies::at(&self.layers_of_share(), s);
         let load = |fluid: &FluidSublayer, frequency: Complex, radiates: bool| {
@@ -70,8 +78,7 @@ impl FluidBone<'_> {
             load(coupling, lossless.coupling, self.radiation[0]),
             load(marrow, lossless.marrow, self.radiation[1]),
         ];
-        let Self { isa, media, components, .. } = *self;
-        isa.run(WaveDeterminant { media, components, s: lossless.bone, k, loads })
+        (lossless, loads)
     }
 
     /// Returns the layers with their share of the loss.

@@ -89,7 +89,7 @@ impl Solver {
 }
 
 /// Returns the fluids above and below the bone.
-fn half_spaces(layers: &Layers) -> Result<[FluidSublayer; 2], ModesError> {
+pub(super) fn half_spaces(layers: &Layers) -> Result<[FluidSublayer; 2], ModesError> {
     let single = |fluids: FluidSublayers, field| match *fluids.as_slice() {
         [fluid] => Ok(fluid),
         _ => Err(ModesError::SeveralFluids { field }),
