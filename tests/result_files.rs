@@ -353,6 +353,9 @@ fn every_key_of_every_solver_is_documented() {
 /// Lists the keys of `value` that `schema` does not know, or that it lacks.
 fn unlike(schema: &Value, value: &Value, path: &str, found: &mut Vec<String>) {
     let Some(entries) = value.as_object() else { return };
+    let forms = schema["anyOf"].as_array().into_iter().flatten();
+    let table = forms.into_iter().find(|form| form["properties"].is_object());
+    let schema = table.unwrap_or(schema);
     for (name, value) in entries {
         let path = format!("{path}.{name}");
         match (&schema["properties"][name], &schema["additionalProperties"]) {
