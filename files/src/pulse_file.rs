@@ -3,7 +3,6 @@
 use std::io;
 use std::path::Path;
 
-use npyz::{NpyFile, Order};
 use osteon_common::pulse_samples::{NoPulse, PulseSamples, SAMPLES};
 use thiserror::Error;
 
@@ -64,29 +63,56 @@ fn row(line: &str) -> Option<[f64; 2]> {
     numbers?.try_into().ok()
 }
 
-/// Returns the rows of an array in NumPy's format.
+/// Returns the rows of an array in NumPy's format: magic bytes, version, the header's length, a header that is a
+/// dictionary in Python's notation, and the numbers.
 fn array(bytes: &[u8]) -> Result<Vec<[f64; 2]>, PulseFileError> {
     let refused = |reason: String| PulseFileError::Array { reason };
-    let open = || NpyFile::new(bytes).map_err(|error| refused(error.to_string()));
-    let header = open()?;
-    let (shape, order) = (header.shape().to_vec(), header.order());
-    let &[count, 2] = shape.as_slice() else {
-        return Err(refused(format!("its shape is {shape:?}")));
+    let (header, data) =
+        split_header(bytes).ok_or_else(|| refused("it does not begin as one".to_owned()))?;
+    let entry = |key: &str, end: char| {
+        let (_, rest) = header.split_once(key)?;
+        rest.split_once(end).map(|(value, _)| value.trim())
     };
-    let numbers: Vec<f64> = match open()?.into_vec::<f64>() {
-        Ok(numbers) => numbers,
-        Err(error) => {
-            let numbers = open()?.into_vec::<f32>();
-            numbers.map_err(|_| refused(error.to_string()))?.into_iter().map(f64::from).collect()
-        }
+    let shape = entry("'shape': (", ')').unwrap_or_default();
+    let sizes: Vec<&str> =
+        shape.split(',').map(str::trim).filter(|size| !size.is_empty()).collect();
+    let rows = match sizes.as_slice() {
+        [rows, "2"] => rows.parse().unwrap_or(0),
+        _ => 0_usize,
     };
-    let count = usize::try_from(count).unwrap_or(usize::MAX);
-    let at = |row: usize, column: usize| match order {
-        Order::C => numbers[2 * row + column],
-        Order::Fortran => numbers[count * column + row],
+    let numbers = match entry("'descr': '", '\'') {
+        Some("<f8") => numbers(data, f64::from_le_bytes),
+        Some("<f4") => numbers(data, |bytes| f64::from(f32::from_le_bytes(bytes))),
+        other => return Err(refused(format!("its numbers are {}", other.unwrap_or("not named")))),
     };
-    // The array has 2 × `count` numbers: `into_vec` has read as many.
-    Ok((0..count.min(numbers.len() / 2)).map(|row| [at(row, 0), at(row, 1)]).collect())
+    if rows == 0 || rows.checked_mul(2) != Some(numbers.len()) {
+        let count = numbers.len();
+        return Err(refused(format!("its shape is ({shape}), with {count} numbers")));
+    }
+    let is_by_columns = entry("'fortran_order': ", ',') == Some("True");
+    let at = |row: usize, column: usize| {
+        numbers[if is_by_columns { rows * column + row } else { 2 * row + column }]
+    };
+    Ok((0..rows).map(|row| [at(row, 0), at(row, 1)]).collect())
+}
+
+/// Returns the header of an array in NumPy's format, and what follows it.
+fn split_header(bytes: &[u8]) -> Option<(&str, &[u8])> {
+    let rest = bytes.strip_prefix(b"\x93NUMPY")?;
+    let (version, rest) = rest.split_at_checked(2)?;
+    let (length, rest) = match version[0] {
+        1 => rest
+            .split_first_chunk()
+            .map(|(length, rest)| (u32::from(u16::from_le_bytes(*length)), rest))?,
+        _ => rest.split_first_chunk().map(|(length, rest)| (u32::from_le_bytes(*length), rest))?,
+    };
+    let (header, data) = rest.split_at_checked(usize::try_from(length).ok()?)?;
+    Some((std::str::from_utf8(header).ok()?, data))
+}
+
+/// Returns the numbers of `SIZE` bytes each; a last one that is cut off is left out.
+fn numbers<const SIZE: usize>(data: &[u8], number: impl Fn([u8; SIZE]) -> f64) -> Vec<f64> {
+    data.as_chunks().0.iter().map(|bytes| number(*bytes)).collect()
 }
 
 /// Returns the step of the rows' times, s.
@@ -110,8 +136,6 @@ fn step(rows: &[[f64; 2]]) -> Result<f64, PulseFileError> {
 
 #[cfg(test)]
 mod tests {
-    use npyz::WriterBuilder as _;
-
     use super::*;
 
     /// Forty samples of a pulse of about 1 MHz at steps of 50 ns.
@@ -161,31 +185,52 @@ mod tests {
         }
     }
 
-    fn npy<T: npyz::AutoSerialize + Copy>(numbers: &[T], order: Order, shape: &[u64]) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let options = npyz::WriteOptions::new().shape(shape).order(order);
-        let mut writer = options.default_dtype().writer(&mut bytes).begin_nd().unwrap();
-        writer.extend(numbers).unwrap();
-        writer.finish().unwrap();
-        bytes
+    /// Returns a file as NumPy 2.4 writes it.
+    fn npy(descr: &str, is_by_columns: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let header =
+            format!("{{'descr': '{descr}', 'fortran_order': {is_by_columns}, 'shape': {shape}, }}");
+        let header = format!("{header:117}\n");
+        let length = u16::try_from(header.len()).unwrap().to_le_bytes();
+        [&b"\x93NUMPY\x01\x00"[..], &length, header.as_bytes(), data].concat()
     }
 
     #[test]
     fn arrays_of_numpy_are_read_in_both_orders_and_precisions() {
         let rows = rows();
+        let bytes = |numbers: &[f64]| -> Vec<u8> {
+            numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
+        };
         let flat: Vec<f64> = rows.iter().flatten().copied().collect();
         let columns: Vec<f64> =
-            [0, 1].iter().flat_map(|&k| rows.iter().map(move |r| r[k])).collect();
-        let single: Vec<f32> = flat.iter().map(|&x| x as f32).collect();
-        for bytes in [
-            npy(&flat, Order::C, &[40, 2]),
-            npy(&columns, Order::Fortran, &[40, 2]),
-            npy(&single, Order::C, &[40, 2]),
+            [0, 1].iter().flat_map(|&k| rows.iter().map(move |row| row[k])).collect();
+        let single: Vec<u8> = flat.iter().flat_map(|&x| (x as f32).to_le_bytes()).collect();
+        let (flat, columns) = (bytes(&flat), bytes(&columns));
+        let is_no_array =
+            "is not an array of two columns of floating-point numbers, time in s and value: ";
+        for (content, expected) in [
+            (npy("<f8", "False", "(40, 2)", &flat), "40 at 5e-8".to_owned()),
+            (npy("<f8", "True", "(40, 2)", &columns), "40 at 5e-8".to_owned()),
+            (npy("<f4", "False", "(40, 2)", &single), "40 at 5e-8".to_owned()),
+            (
+                npy("<f8", "False", "(2, 40)", &columns),
+                format!("{is_no_array}its shape is (2, 40), with 80 numbers"),
+            ),
+            (
+                npy("<f8", "False", "(18446744073709551615, 2)", &flat),
+                format!("{is_no_array}its shape is (18446744073709551615, 2), with 80 numbers"),
+            ),
+            (
+                npy("<f8", "False", "(40, 2)", &flat[..300]),
+                format!("{is_no_array}its shape is (40, 2), with 37 numbers"),
+            ),
+            (npy("<i8", "False", "(40, 2)", &flat), format!("{is_no_array}its numbers are <i8")),
+            (b"no array".to_vec(), format!("{is_no_array}it does not begin as one")),
+            (
+                b"\x93NUMPY\x02\x00\xff\xff\xff\xff".to_vec(),
+                format!("{is_no_array}it does not begin as one"),
+            ),
         ] {
-            assert_eq!(check("pulse.npy", &bytes), "40 at 5e-8");
+            assert_eq!(check("pulse.npy", &content), expected);
         }
-        let wide = check("pulse.npy", &npy(&columns, Order::C, &[2, 40]));
-        assert!(wide.contains("its shape is [2, 40]"), "{wide}");
-        assert!(check("pulse.npy", b"no array").contains("is not an array"));
     }
 }
