@@ -374,7 +374,7 @@ fn what_a_user_does_not_see_is_shown() {
     assert!(read.stderr.contains("without width are not read"), "{read:?}");
     // In the log, where it would also begin a new line.
     let url = format!("unix:{}", text(&scratch.path("a\u{1b}[2J\n\u{202e}ERROR")));
-    let worker = ["worker", "--coordinator", &url, "--give-up-after", "0.1"];
+    let worker = ["worker", "--coordinator", &url, "--give-up-after", "1"];
     check(&worker, &["WARN", r"a\u{1b}[2J\n\u{202e}ERROR"]);
 }
 

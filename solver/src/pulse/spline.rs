@@ -103,8 +103,8 @@ mod tests {
     use super::*;
 
     fn spline() -> Spline {
-        let value = |j: u32| libm::sin(0.5 * f64::from(j)) * libm::exp(-0.1 * f64::from(j));
-        let samples: Vec<f64> = (1..150).map(value).collect();
+        let value = |j: f64| j * j * libm::sin(0.35 * j) * libm::exp(-0.15 * j);
+        let samples: Vec<f64> = (1..150).map(|j| value(f64::from(j))).collect();
         Spline::new(&PulseSamples::new(2e-8, &samples).unwrap())
     }
 

@@ -7,8 +7,7 @@ use super::number::{VELOCITY_DIGITS, digits, significant};
 
 /// Returns the table, and whether the check was passed.
 pub(super) fn table(check: &Check) -> String {
-    let header =
-        ["solver", "velocity (m/s)", "difference", "time difference (s)", "estimated error"];
+    let header = ["solver", "velocity (m/s)", "difference", "in time (s)", "estimated error"];
     let mut rows = vec![header.map(str::to_owned)];
     rows.extend(check.solutions().map(row));
     let verdict = if check.passed() {
