@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 use osteon_common::probe::Probe;
 use osteon_common::pulse::{PulseForm, RICKER_MIDDLE};
 
-use self::spline::Spline;
+use self::spline::PulseSpline;
 use crate::complex::Complex;
 use crate::quadrature::{PANEL_PHASE, for_each_node};
 
@@ -37,25 +37,25 @@ const BISECTIONS: u32 = 40;
 pub(crate) struct Pulse {
     amplitude: f64,
     center_frequency: f64,
-    values: Values,
+    values: PulseValues,
 }
 
 /// The values of a pulse, for the amplitude 1.
 #[derive(Debug, Clone)]
-enum Values {
+enum PulseValues {
     /// Of a tone with this number of cycles.
     Tone(f64),
     Ricker,
-    Samples(Spline),
+    Samples(PulseSpline),
 }
 
 impl Pulse {
     /// Creates the pulse of a probe, but with this amplitude.
     pub(crate) fn new(amplitude: f64, probe: &Probe) -> Self {
         let values = match (&probe.pulse, probe.pulse.tone_cycles()) {
-            (_, Some(cycles)) => Values::Tone(cycles),
-            (PulseForm::Samples(samples), None) => Values::Samples(Spline::new(samples)),
-            (_, None) => Values::Ricker,
+            (_, Some(cycles)) => PulseValues::Tone(cycles),
+            (PulseForm::Samples(samples), None) => PulseValues::Samples(PulseSpline::new(samples)),
+            (_, None) => PulseValues::Ricker,
         };
         Self { amplitude, center_frequency: probe.center_frequency, values }
     }
@@ -74,9 +74,9 @@ impl Pulse {
     /// of their end.
     fn duration(&self, paper: f64, ricker: f64) -> f64 {
         match &self.values {
-            Values::Tone(cycles) => 0.5 * cycles * paper / self.center_frequency,
-            Values::Ricker => ricker / self.center_frequency,
-            Values::Samples(spline) => spline.length(),
+            PulseValues::Tone(cycles) => 0.5 * cycles * paper / self.center_frequency,
+            PulseValues::Ricker => ricker / self.center_frequency,
+            PulseValues::Samples(spline) => spline.length(),
         }
     }
 
@@ -87,17 +87,17 @@ impl Pulse {
         }
         let periods = self.center_frequency * t;
         match &self.values {
-            Values::Tone(cycles) => {
+            PulseValues::Tone(cycles) => {
                 let (from_middle, _) = tone_envelope(*cycles, periods);
                 self.amplitude
                     * libm::sin(2.0 * PI * periods)
                     * libm::exp(-4.0 * from_middle * from_middle)
             }
-            Values::Ricker => {
+            PulseValues::Ricker => {
                 let u = PI * (periods - RICKER_MIDDLE);
                 self.amplitude * (1.0 - 2.0 * u * u) * libm::exp(-u * u)
             }
-            Values::Samples(spline) => self.amplitude * spline.at(t).0,
+            PulseValues::Samples(spline) => self.amplitude * spline.at(t).0,
         }
     }
 
@@ -106,17 +106,17 @@ impl Pulse {
         let periods = self.center_frequency * t;
         let scale = self.amplitude * self.center_frequency;
         match &self.values {
-            Values::Tone(cycles) => {
+            PulseValues::Tone(cycles) => {
                 let (from_middle, rate) = tone_envelope(*cycles, periods);
                 let (sin, cos) = libm::sincos(2.0 * PI * self.center_frequency * t);
                 let envelope = libm::exp(-4.0 * from_middle * from_middle);
                 scale * envelope * (2.0 * PI * cos - 8.0 * from_middle * rate * sin)
             }
-            Values::Ricker => {
+            PulseValues::Ricker => {
                 let u = PI * (periods - RICKER_MIDDLE);
                 scale * PI * (4.0 * u * u - 6.0) * u * libm::exp(-u * u)
             }
-            Values::Samples(spline) => self.amplitude * spline.at(t).1,
+            PulseValues::Samples(spline) => self.amplitude * spline.at(t).1,
         }
     }
 
@@ -146,7 +146,7 @@ impl Pulse {
     ///
     /// That of a formula by quadrature: the pulse is smooth on its support, and no special function is needed.
     pub(crate) fn spectrum(&self, damping: f64, period: f64, numbers: &[usize]) -> Vec<Complex> {
-        if let Values::Samples(spline) = &self.values {
+        if let PulseValues::Samples(spline) = &self.values {
             let at = |&n: &usize| Complex::new(damping, 2.0 * PI * n as f64 / period);
             return numbers.iter().map(|n| spline.transform(at(n)).scale(self.amplitude)).collect();
         }

@@ -153,7 +153,7 @@ fn pulse() -> Json {
 fn pores() -> Json {
     let one = number(None, Parameter::Porosity.row().accepted);
     let mut profile = table(&entries(&mut PorosityProfile::default()));
-    profile["anyOf"] = json!([{ "required": ["surface", "marrow"] }, { "required": ["values"] }]);
+    profile["dependentRequired"] = json!({ "surface": ["marrow"], "marrow": ["surface"] });
     let model = described(table(&entries(&mut PorosityModel::default())), PorosityModel::KEY);
     let porosity = described(json!({ "anyOf": [one, profile] }), POROSITY);
     object(json!({ POROSITY.name: porosity, PorosityModel::KEY.name: model }))

@@ -17,6 +17,7 @@ mod banded;
 mod complex_plate;
 mod contour;
 mod count;
+mod cross_section;
 mod crossings;
 mod dense;
 mod family;
@@ -24,7 +25,6 @@ mod fluid_bone;
 mod fluid_modes;
 mod free_bone;
 mod modes;
-mod section;
 mod shape;
 mod stack;
 

@@ -10,7 +10,7 @@ use crate::complex::Complex;
 
 /// A pulse of samples, of which the largest has the size 1.
 #[derive(Debug, Clone)]
-pub(super) struct Spline {
+pub(super) struct PulseSpline {
     /// Distance of the knots, s.
     step: f64,
     /// Values at the knots.
@@ -19,7 +19,7 @@ pub(super) struct Spline {
     curvatures: Vec<f64>,
 }
 
-impl Spline {
+impl PulseSpline {
     /// Joins samples.
     pub(super) fn new(samples: &PulseSamples) -> Self {
         let largest = samples.values().iter().fold(0.0_f64, |max, value| value.abs().max(max));
@@ -102,10 +102,10 @@ fn curvatures(values: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    fn spline() -> Spline {
+    fn spline() -> PulseSpline {
         let value = |j: f64| j * j * libm::sin(0.35 * j) * libm::exp(-0.15 * j);
         let samples: Vec<f64> = (1..150).map(|j| value(f64::from(j))).collect();
-        Spline::new(&PulseSamples::new(2e-8, &samples).unwrap())
+        PulseSpline::new(&PulseSamples::new(2e-8, &samples).unwrap())
     }
 
     #[test]

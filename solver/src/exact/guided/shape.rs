@@ -3,11 +3,11 @@
 use osteon_common::bone::BoneRef;
 use thiserror::Error;
 
+use super::cross_section::{CrossSection, LowerEnd, WaveField};
 use super::family::{Family, Symmetry};
 use super::fluid_bone::FluidBone;
 use super::fluid_modes::half_spaces;
 use super::modes::{Mode, ModesError};
-use super::section::{LowerEnd, Section, WaveField};
 use crate::complex::Complex;
 use crate::media::Media;
 use crate::solver::Solver;
@@ -77,7 +77,7 @@ impl Solver {
     ) -> Result<ModeShape, ShapeError> {
         let asked = AskedShape::new(self, bone.into(), mode, depths)?;
         let AskedShape { media, family, halves, extent, .. } = &asked;
-        let whole = Section {
+        let whole = CrossSection {
             media,
             components: &family.components,
             s: Complex::new(0.0, mode.phase_velocity * mode.wavenumber),
@@ -92,7 +92,7 @@ impl Solver {
         }
         // Waves of other families may have the same wavenumber, but differ in the middle plane.
         let upper = &asked.depths[..depths.div_ceil(2)];
-        let half = Section {
+        let half = CrossSection {
             lower_end: LowerEnd::Middle(&family.middle),
             extent: 0.5 * extent,
             depths: upper,
@@ -130,7 +130,7 @@ impl Solver {
             share: 1.0,
         };
         let (lossless, [load, load_below]) = bone.loads(k);
-        let section = Section {
+        let section = CrossSection {
             media,
             components: &family.components,
             s: lossless.bone,

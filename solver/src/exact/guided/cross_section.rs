@@ -34,7 +34,7 @@ pub(super) enum LowerEnd<'a> {
 
 /// Kernel that computes the field of the wave with this wavenumber at some depths; `None` if it is not the
 /// only wave there. Its largest displacement is 1.
-pub(super) struct Section<'a> {
+pub(super) struct CrossSection<'a> {
     pub(super) media: &'a Media,
     /// The components of the displacement.
     pub(super) components: &'a [usize],
@@ -51,7 +51,7 @@ pub(super) struct Section<'a> {
     pub(super) depths: &'a [f64],
 }
 
-impl Kernel for Section<'_> {
+impl Kernel for CrossSection<'_> {
     type Output = Option<Vec<WaveField>>;
 
     #[inline(always)]
@@ -70,7 +70,7 @@ impl Kernel for Section<'_> {
 /// A slice: its medium, and its thickness, m.
 type MediumSlice<'a> = (&'a MediumLayer, f64);
 
-impl<'a> Section<'a> {
+impl<'a> CrossSection<'a> {
     /// Returns the slices, downwards, and above which of them each depth is. All depths and joints are
     /// between slices.
     #[inline(always)]
