@@ -102,8 +102,7 @@ impl Exact {
 
     /// Returns the method for another setup with the same tables ([`has_tables_of`]), which it shares.
     pub(crate) fn with_setup(&self, setup: &Setup) -> Self {
-        let prepared = PreparedSetup { setup: setup.clone(), ..self.prepared.clone() };
-        Self { prepared, ..self.clone() }
+        Self { prepared: self.prepared.with_setup(setup), ..self.clone() }
     }
 
     pub(crate) fn arrival(

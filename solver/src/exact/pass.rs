@@ -79,8 +79,7 @@ pub(super) fn pick_with_error(
     workspace: &ExactWorkspace,
 ) -> Result<Estimated, Failure> {
     let fc = prepared.setup.probe.center_frequency;
-    let pick =
-        pick(&picking::criterion(&prepared.setup), fc, &prepared.distances, &workspace.windows)?;
+    let pick = pick(&prepared.criterion, fc, &prepared.distances, &workspace.windows)?;
     let moved = prepared.isa.run(Repick { bin, band, times: &pick.times, workspace });
     let changes: [f64; LANES] = std::array::from_fn(|taper| {
         let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();

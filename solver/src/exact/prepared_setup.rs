@@ -4,10 +4,12 @@ use osteon_common::bone::BoneRef;
 use osteon_common::case::Setup;
 use osteon_common::probe::Place;
 use osteon_common::sampling;
+use osteon_common::settings::Picking;
 
 use crate::failure::{Failure, check_direct_wave, speed_not_finite};
 use crate::isa::Isa;
 use crate::media::Media;
+use crate::picking::criterion;
 
 /// A setup, the places of its receivers, and the instruction set on which it is computed.
 #[derive(Debug, Clone)]
@@ -16,6 +18,8 @@ pub(super) struct PreparedSetup {
     /// Distances of the receivers along the probe, m.
     pub(super) distances: Vec<f64>,
     pub(super) places: Vec<Place>,
+    /// The criterion of the first arriving signal, for the probe's pulse.
+    pub(super) criterion: Picking,
     pub(super) isa: Isa,
 }
 
@@ -25,8 +29,14 @@ impl PreparedSetup {
             setup: setup.clone(),
             distances: setup.probe.distances().collect(),
             places: setup.probe.places().collect(),
+            criterion: criterion(setup),
             isa,
         }
+    }
+
+    /// Returns the same for another setup with the same probe.
+    pub(super) fn with_setup(&self, setup: &Setup) -> Self {
+        Self { setup: setup.clone(), criterion: criterion(setup), ..self.clone() }
     }
 
     /// Returns the media of a bone, and the upper bound of every wave's speed, m/s.

@@ -5,7 +5,7 @@ use osteon_common::sampling::{self, Grade};
 use crate::exact::estimated::Estimated;
 use crate::exact::pass::slow_decay_factor;
 use crate::exact::prepared_setup::PreparedSetup;
-use crate::picking::{self, Pick};
+use crate::picking::Pick;
 
 /// Stated errors at refinement 1 between which the weight of further passes rises from 0 to 1. The whole
 /// error decides about the plain grade and about wider bands of quick and plain passes; of a bone that
@@ -100,7 +100,7 @@ pub(super) fn unreliable_pick_weight(
         delay = delay.max(t - sampling::earliest_arrival(&prepared.setup, place, speed));
         margin = margin.min(sampling::direct_arrival(&prepared.setup, place) - t);
     }
-    let threshold = picking::criterion(&prepared.setup).threshold;
+    let threshold = prepared.criterion.threshold;
     let (ratio, skipped) = (found.pick.ratio / threshold, found.pick.skipped / threshold);
     rise(delay * fc - prepared.setup.probe.pulse.delay(fc), LATE)
         .max(rise(found.pick.residual * fc, OFF_LINE))
