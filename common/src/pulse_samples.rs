@@ -70,7 +70,7 @@ pub enum NoPulse {
     },
 }
 
-/// What samplings need to know of a pulse.
+/// The frequencies (Hz) and times (s) of a pulse by which the sampling of its waves is chosen, and its onset.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Traits {
     mean_frequency: f64,

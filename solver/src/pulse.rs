@@ -43,7 +43,7 @@ pub(crate) struct Pulse {
 /// The values of a pulse, for the amplitude 1.
 #[derive(Debug, Clone)]
 enum PulseValues {
-    /// Of a tone with this number of cycles.
+    /// A tone, with its number of cycles.
     Tone(f64),
     Ricker,
     Samples(PulseSpline),

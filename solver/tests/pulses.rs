@@ -39,8 +39,8 @@ fn both_methods_agree_on_every_pulse_and_width() {
         (Tone { cycles: 6.0 }, 0.0, 3e-3),
         (Ricker, 0.0, 1.5e-3),
         (Ricker, 0.7e-3, 5e-3),
-        (measured(), 0.0, 4e-3),
-        (measured(), 0.5e-3, 2e-3),
+        (transducer_pulse(), 0.0, 4e-3),
+        (transducer_pulse(), 0.5e-3, 2e-3),
     ]) {
         let mut setup = setup(pulse.clone(), width);
         setup.layers.bone_thickness = thickness;
@@ -55,7 +55,7 @@ fn both_methods_agree_on_every_pulse_and_width() {
 }
 
 /// The response of a transducer of 0.9 MHz that rings for some microseconds, at steps of 40 ns.
-fn measured() -> PulseForm {
+fn transducer_pulse() -> PulseForm {
     let value = |t: f64| t * t * libm::exp(-2.2 * t) * libm::sin(5.65 * t);
     let values: Vec<f64> = (1..150).map(|j| value(0.04 * f64::from(j))).collect();
     PulseForm::Samples(PulseSamples::new(4e-8, &values).unwrap())

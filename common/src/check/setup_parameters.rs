@@ -11,9 +11,9 @@ use super::range::range;
 use super::setup::setup as check_setup;
 use super::value::known_wrong;
 
-/// Checks the parameters of the setup, which not every job searches. Both bounds of each must give a valid setup, also with
-/// the quantities that are random. One is checked at a time, with the others at their starts: a rule that
-/// two of them break only together is not found here.
+/// Checks the parameters of the setup, which not every job searches. Both bounds of each must give a valid
+/// setup, also with the quantities that are random. One is checked at a time, with the others at their
+/// starts: a rule that two of them break only together is not found here.
 pub(super) fn setup_parameters(specification: &JobSpecification, violations: &mut Violations) {
     for parameter in Parameter::OF_SETUP {
         let Some(quantity) = parameter.of_setup() else { continue };

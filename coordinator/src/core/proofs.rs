@@ -51,7 +51,7 @@ impl SetupKey {
 /// The proofs of one setup.
 #[derive(Debug)]
 pub(crate) struct SetupProofs {
-    /// What is computed. Its `id` is the attempt, which is the number of no evaluation.
+    /// What workers compute for a proof. Its `id` is the attempt, a number that no evaluation has.
     input: Arc<EvaluationInput>,
     /// The votes of the hosts.
     pub(crate) ballot: Ballot,

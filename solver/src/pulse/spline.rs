@@ -57,11 +57,11 @@ impl PulseSpline {
         let x = s.scale(self.step);
         let one = Complex::new(1.0, 0.0);
         let shift = x.scale(-1.0).exp();
-        // Of a whole hat about 0, in units of the step: (sinh(x/2)/(x/2))².
+        // The transform of a hat function about 0, in units of the step: (sinh(x/2)/(x/2))².
         let (growing, falling) = (x.scale(0.5).exp(), x.scale(-0.5).exp());
         let ratio = (growing - falling) / x;
         let whole = ratio * ratio;
-        // Of its two halves, after 0 and before it.
+        // The transforms of its half after 0 and of its half before 0.
         let after = (one - (one - shift) / x) / x;
         let before = whole - after;
         let last = self.curvatures.len() - 1;

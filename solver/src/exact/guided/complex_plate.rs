@@ -66,7 +66,7 @@ pub(super) struct WaveDeterminant<'a> {
     pub(super) s: Complex,
     /// Wavenumber, rad/m.
     pub(super) k: Complex,
-    /// What answers displacements across the upper and the lower face, Pa/m.
+    /// Stiffness of the fluids at the upper and at the lower face against displacements across it, Pa/m.
     pub(super) loads: [Complex; 2],
 }
 

@@ -23,10 +23,10 @@ const DIFFERENCE_MAX: f64 = 1e-6;
 /// Displacements u1, u2, u3 (m) and tractions σ13, σ23, σ33 (Pa) at one depth.
 pub(super) type WaveField = [Complex; 6];
 
-/// What holds at the lower end of a section.
+/// The condition at the lower end of a section.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum LowerEnd<'a> {
-    /// The lower face, with what answers displacements across it, Pa/m.
+    /// The lower face, and the stiffness of the fluid below it against displacements across it, Pa/m.
     Face(Complex),
     /// The middle plane, with the components of the displacement that are not zero there.
     Middle(&'a [usize]),
@@ -42,7 +42,7 @@ pub(super) struct CrossSection<'a> {
     pub(super) s: Complex,
     /// Wavenumber of fields ∝ exp(st - ikx1), rad/m.
     pub(super) k: Complex,
-    /// What answers displacements across the upper face, Pa/m.
+    /// Stiffness of the fluid above the upper face against displacements across it, Pa/m.
     pub(super) load: Complex,
     pub(super) lower_end: LowerEnd<'a>,
     /// From the upper face to the end of the section, m.
