@@ -14,7 +14,6 @@ use osteon_common::porosity::BoneMatrix;
 use osteon_common::posterior::Posterior;
 use osteon_common::quantile::quantile;
 use osteon_common::random_quantities::RandomQuantities;
-use osteon_solver::Isa;
 use rayon::prelude::*;
 
 use crate::generator::Generator;
@@ -171,7 +170,7 @@ pub fn unmodelled(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTa
             let mean = middle(ends);
             let uniform = velocities(Pores { porosity: Some(mean), ..Pores::default() })?;
             let shift = mean_of(&profiled) - mean_of(&uniform);
-            let found = identify_pores(&setup, profiled, twins.seed, twins.isa)?;
+            let found = identify_pores(&setup, profiled, twins)?;
             let value =
                 |k: usize| found.map_or("–".to_owned(), |found| format!("{:.3}", found[k].value));
             table.push(vec![
@@ -240,11 +239,8 @@ fn identify_bone(
         return Ok(None);
     }
     let mut found = [[(None, 0.0); 2]; COVERAGE_VELOCITIES.len()];
-    // Each job has a seed of its own: the error of the model's realizations would else be the same in all.
-    let model_seed = twins.seed + number;
     for (found, count) in found.iter_mut().zip(COVERAGE_VELOCITIES) {
-        let velocities = velocities[..count].to_vec();
-        let identified = identify_pores(&Setup::default(), velocities, model_seed, twins.isa)?;
+        let identified = identify_pores(&Setup::default(), velocities[..count].to_vec(), twins)?;
         *found = [0, 1].map(|k| (identified.map(|identified| identified[k]), truth[k]));
     }
     Ok(Some(found))
@@ -255,14 +251,13 @@ fn identify_bone(
 fn identify_pores(
     setup: &Setup,
     velocities: Vec<f64>,
-    seed: u64,
-    isa: Isa,
+    twins: &Twins,
 ) -> Result<Option<[DerivedQuantity; 2]>, StudyError> {
-    let mut specification = specification(setup, velocities, REALIZATIONS, seed);
+    let mut specification = specification(setup, velocities, REALIZATIONS, twins.seed);
     let start = middle(POROSITIES);
     specification.setup.pores.porosity = Some(start);
     specification.parameters[Parameter::Porosity as usize] = free(POROSITY_BOUNDS, start);
-    let found = identify(&specification, &mut RealizationCache::new(), isa)?;
+    let found = identify(&specification, &mut RealizationCache::new(), twins.isa)?;
     Ok(found
         .result
         .conclusions
@@ -373,6 +368,8 @@ fn mean_of(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use osteon_solver::Isa;
+
     use super::*;
 
     #[test]
