@@ -69,12 +69,16 @@ impl AttainableMoments {
     }
 }
 
-/// Returns the smallest and the largest mean velocity, m/s, that points within `ranges` can have.
+/// Returns the smallest and the largest mean velocity, m/s, that points within `ranges` can have; of a
+/// bone of sublayers no closed form is known.
 fn velocities(ranges: &[Range; PARAMETERS], setup: &Setup) -> (f64, f64) {
+    if setup.structure.is_layered() {
+        return (0.0, f64::INFINITY);
+    }
     let (density, modulus) =
         (ends(ranges, Parameter::Density), ends(ranges, Parameter::LongitudinalYoungModulus));
     // e_L is at least this part of that between the pores, and the density is not larger.
-    let solid = 1.0 - setup.pores.mean_porosity().unwrap_or(0.0);
+    let solid = 1.0 - setup.structure.mean_porosity().unwrap_or(0.0);
     let bar_velocity_min = (solid * modulus.0 / density.1).sqrt();
     let highest = highest_bulk_velocity_point(ranges);
     let bulk_velocity_max = match highest.and_then(|point| bulk_velocity(&point).ok()) {

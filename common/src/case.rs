@@ -1,9 +1,9 @@
 //! One deterministic problem: layers, probe, criterion, solver, and one bone.
 
 use crate::bone::CaseBone;
+use crate::bone_structure::BoneStructure;
 use crate::fields::{Key, Section};
 use crate::layers::Layers;
-use crate::pores::Pores;
 use crate::probe::Probe;
 use crate::settings::{Picking, SolverSettings};
 
@@ -21,9 +21,9 @@ pub struct Setup {
     pub picking: Picking,
     /// Settings of the wave solver.
     pub solver: SolverSettings,
-    /// Pores of the bone, if this is the setup of a job whose bone follows from a porosity. A solver is
-    /// given a bone and ignores them.
-    pub pores: Pores,
+    /// Pores or sublayers of the bone, if this is the setup of a job. A solver is given a bone and ignores
+    /// them.
+    pub structure: BoneStructure,
 }
 
 impl Setup {

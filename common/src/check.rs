@@ -3,11 +3,11 @@
 //! Fields are named as in a job file, e.g. `layers.coupling.density`. A field that is already known
 //! to be wrong is not checked again, nor is a relation between fields of which one is wrong.
 
+mod bone_structure;
 mod data;
 mod job;
 mod known_quantities;
 mod observables;
-mod pores;
 mod porosity;
 mod posterior;
 mod priors;
@@ -22,9 +22,9 @@ mod value;
 use crate::job::JobSpecification;
 use crate::violations::Violations;
 
+pub use self::bone_structure::porosity_profile;
 pub use self::data::{COUNT, DATA_FORMS, REPEATABILITY, VELOCITIES_MIN, VELOCITY, data, no_data};
 pub use self::job::{job, job_from};
-pub use self::pores::porosity_profile;
 pub use self::porosity::{porosity, porosity_model};
 pub use self::posterior::posterior;
 pub use self::random_quantities::random_quantities;

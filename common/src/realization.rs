@@ -61,7 +61,7 @@ pub enum NoBone {
 /// # Errors
 /// If the mean model is not admissible, or has no stiffness with the pores of the setup.
 pub fn mean_bone(point: &Point, setup: &Setup) -> Result<CaseBone, NoPorousBone> {
-    setup.pores.bone(&point.mean_model(), setup.layers.bone_thickness, Ok)
+    setup.structure.bone(&point.mean_model(), setup.layers.bone_thickness, Ok)
 }
 
 impl Realization {
@@ -121,8 +121,8 @@ impl Ensemble {
     /// [`ElasticityLaw::realize`]), or if there is no mean bone with the pores of this realization.
     pub fn realization(&self, index: u64, setup: &Setup) -> Result<Realization, NoBone> {
         let own_setup = self.own_setup(index, setup);
-        let Setup { pores, layers, .. } = own_setup.as_ref().unwrap_or(setup);
-        if !pores.is_any() {
+        let Setup { structure, layers, .. } = own_setup.as_ref().unwrap_or(setup);
+        if !structure.is_given() {
             return Ok(Realization { own_setup, bone: self.bone(index)?.into() });
         }
         let matrix = self.point.mean_model();
@@ -130,7 +130,7 @@ impl Ensemble {
         let realized = |mean: Bone| -> Result<Bone, NoBone> {
             Ok(Bone { elasticity: realize(&mean.elasticity)?, ..mean })
         };
-        let bone = pores.bone(&matrix, layers.bone_thickness, realized)?;
+        let bone = structure.bone(&matrix, layers.bone_thickness, realized)?;
         Ok(Realization { own_setup, bone })
     }
 
@@ -196,18 +196,18 @@ mod tests {
         let plain = Realization { own_setup: None, bone: bone.into() };
         assert_eq!(none.realization(3, &setup), Ok(plain));
         // Nearly without pores or dispersion, it is the mean model.
-        setup.pores.porosity = Some(1e-9);
+        setup.structure.porosity = Some(1e-9);
         let CaseBone::Homogeneous(porous) = none.realization(3, &setup).unwrap().bone else {
             panic!("one porosity");
         };
         let change = porous.elasticity.rows()[0][0] / bone.elasticity.rows()[0][0] - 1.0;
         assert!(change.abs() < 1e-7 && change != 0.0, "{change}");
-        setup.pores.porosity = Some(0.1);
+        setup.structure.porosity = Some(0.1);
         let scatter = Scatter { standard_deviation: Some(0.02), ..Scatter::default() };
         let random = RandomQuantities { porosity: scatter, ..RandomQuantities::default() };
         let Realization { own_setup, bone } =
             none.with_random(random).realization(3, &setup).unwrap();
-        let own = own_setup.and_then(|setup| setup.pores.porosity).unwrap();
+        let own = own_setup.and_then(|setup| setup.structure.porosity).unwrap();
         let CaseBone::Homogeneous(bone) = bone else { panic!("one porosity") };
         let expected = (1.0 - own) * OPTIMUM.density() + own * 1000.0;
         assert!(own != 0.1 && (bone.density - expected).abs() < 1e-9, "{own}");

@@ -88,9 +88,9 @@ impl SetupQuantity {
                 coupling.sublayers.is_empty().then_some(coupling.sound_speed)
             }
             Self::ProbeTilt => Some(setup.probe.tilt),
-            Self::Porosity => setup.pores.porosity,
-            Self::SurfacePorosity => setup.pores.profile.surface,
-            Self::MarrowPorosity => setup.pores.profile.marrow,
+            Self::Porosity => setup.structure.porosity,
+            Self::SurfacePorosity => setup.structure.profile.surface,
+            Self::MarrowPorosity => setup.structure.profile.marrow,
         }
     }
 
@@ -112,9 +112,9 @@ impl SetupQuantity {
             Self::BoneQualityFactor => setup.layers.bone_attenuation.quality_factor = Some(value),
             Self::CouplingSoundSpeed => setup.layers.coupling.sound_speed = value,
             Self::ProbeTilt => setup.probe.tilt = value,
-            Self::Porosity => setup.pores.porosity = Some(value),
-            Self::SurfacePorosity => setup.pores.profile.surface = Some(value),
-            Self::MarrowPorosity => setup.pores.profile.marrow = Some(value),
+            Self::Porosity => setup.structure.porosity = Some(value),
+            Self::SurfacePorosity => setup.structure.profile.surface = Some(value),
+            Self::MarrowPorosity => setup.structure.profile.marrow = Some(value),
         }
         setup
     }

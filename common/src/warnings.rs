@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::bone_structure::MeanSolid;
 use crate::case::{Bone, Case, Setup};
 use crate::field_path::{element_path, entry_path};
 use crate::fields::{self, DeclaredKey, DeclaredValue, Number};
@@ -15,6 +16,8 @@ use crate::setup_quantity::SetupQuantity;
 
 use crate::plausible::{self, PlausibleRange, short};
 
+/// Path of the sublayers of a bone.
+const SUBLAYERS: &str = "bone.sublayers";
 /// Most rows that are named which are no measurements.
 const NO_ROWS_MAX: usize = 5;
 /// A velocity that differs from the median by more than this factor is probably in another unit.
@@ -47,8 +50,7 @@ pub fn case_warnings(case: &Case) -> Vec<Warning> {
     let mut warnings = Warnings::default();
     warnings.setup(&case.setup);
     if case.bone.sublayers().is_some() {
-        let whole = SetupQuantity::BoneThickness.mean_key();
-        warnings.rename(whole, "bone.sublayers", "the thickness of all together");
+        warnings.rename_whole_thickness();
     }
     for (table, solid) in case.bone.solids() {
         warnings.solid(&table, solid);
@@ -68,6 +70,15 @@ pub fn job_warnings_from(
 ) -> Vec<Warning> {
     let mut warnings = Warnings::default();
     warnings.setup(&specification.setup);
+    let structure = &specification.setup.structure;
+    if structure.is_layered() {
+        warnings.rename_whole_thickness();
+    }
+    for (index, sublayer) in structure.sublayers.iter().enumerate() {
+        if let MeanSolid::Given(solid) = &sublayer.solid {
+            warnings.solid(&element_path(SUBLAYERS, index), solid);
+        }
+    }
     for parameter in specification.parameters_ranged() {
         warnings.parameter(parameter, specification.range(parameter));
     }
@@ -92,11 +103,12 @@ impl Warnings {
         }
     }
 
-    /// Gives the warnings about `field` another one, and what of it they are about.
-    fn rename(&mut self, field: &str, other: &str, what: &str) {
-        for warning in self.0.iter_mut().filter(|warning| warning.field == field) {
-            warning.field = other.to_owned();
-            warning.message = format!("{what} {}", warning.message);
+    /// Gives the warnings about the thickness of the bone to its sublayers, which add up to it.
+    fn rename_whole_thickness(&mut self) {
+        let whole = SetupQuantity::BoneThickness.mean_key();
+        for warning in self.0.iter_mut().filter(|warning| warning.field == whole) {
+            SUBLAYERS.clone_into(&mut warning.field);
+            warning.message = format!("the thickness of all together {}", warning.message);
         }
     }
 

@@ -12,13 +12,13 @@ mod schema;
 
 use std::path::{Path, PathBuf};
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::case::Setup;
 use osteon_common::check;
 use osteon_common::job::{
     JobKind, JobSpecification, MonteCarlo, Objective, Omitted, PosteriorSettings, Search,
 };
 use osteon_common::limits;
-use osteon_common::pores::Pores;
 use osteon_common::pulse::PulseForm;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::warnings::{self, Warning};
@@ -29,7 +29,7 @@ use crate::file_error::{ContentError, FileError, Invalid, SizeLimit};
 use crate::input_file::InputFile;
 use crate::reader::{self, Reader, Table};
 use crate::setting::Setting;
-use crate::{pores, pulse};
+use crate::{bone_structure, pulse};
 
 pub use self::key_tables::{job_table, porosity_table, setup_table};
 pub use self::purpose::{FilePurpose, purpose};
@@ -139,7 +139,7 @@ fn of_tree(
         "probe",
         "picking",
         "solver",
-        Pores::KEY.name,
+        BoneStructure::KEY.name,
         "data",
         "parameters",
         "random",
@@ -152,10 +152,9 @@ fn of_tree(
     if !table.is_table() {
         return Err(reader.refuse(document, root));
     }
-    let setup = Setup {
-        pores: pores::of_job(&mut reader, &table),
-        ..setup(&mut reader, &table, directory)
-    };
+    let mut setup = setup(&mut reader, &table, directory);
+    let thickness = &mut setup.layers.bone_thickness;
+    setup.structure = bone_structure::of_job(&mut reader, &table, thickness);
     let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
     let posterior = posterior::read(&mut reader, &table);
     let (objective, objective_omitted) = objective(&mut reader, &table);

@@ -9,6 +9,7 @@
 
 #![forbid(unsafe_code)]
 
+mod bone_structure;
 pub mod case_file;
 pub mod document;
 mod document_text;
@@ -18,7 +19,6 @@ pub mod init;
 pub mod input_file;
 pub mod job_file;
 pub mod materials;
-mod pores;
 pub mod posterior_csv;
 mod pulse;
 mod pulse_file;
@@ -26,6 +26,8 @@ mod reader;
 pub mod report;
 pub mod results_csv;
 pub mod setting;
+mod solid;
+mod sublayers;
 mod toml_text;
 pub mod user_file;
 mod velocities;

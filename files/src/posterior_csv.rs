@@ -1,8 +1,8 @@
 //! Draws from posteriors as CSV: `posterior.csv`.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::job::{Data, JobSpecification};
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::pores::Pores;
 use osteon_common::posterior::PosteriorDraw;
 
 use crate::results_csv::{field, number};
@@ -23,17 +23,17 @@ pub fn posterior<'a>(
     out.push_str(if names.is_empty() { "\n" } else { ",group\n" });
     for (set, draws) in draws.into_iter().enumerate() {
         let end = names.get(set).map(|name| format!(",{}", field(name))).unwrap_or_default();
-        add(&mut out, &specification.setup.pores, draws, &end);
+        add(&mut out, &specification.setup.structure, draws, &end);
     }
     out
 }
 
 /// Appends a row for each draw, each with this end.
-fn add(out: &mut String, pores: &Pores, draws: &[PosteriorDraw], end: &str) {
+fn add(out: &mut String, structure: &BoneStructure, draws: &[PosteriorDraw], end: &str) {
     for (place, draw) in draws.iter().enumerate() {
         out.push_str(&place.to_string());
         let PosteriorDraw { point, log_density, mean, coefficient_of_variation } = draw;
-        let derived = [speed(pores, point), Some(*mean), Some(*coefficient_of_variation)];
+        let derived = [speed(structure, point), Some(*mean), Some(*coefficient_of_variation)];
         let numbers =
             point.given().map(|(_, value)| Some(value)).chain(derived).chain([Some(*log_density)]);
         for value in numbers {
@@ -46,6 +46,6 @@ fn add(out: &mut String, pores: &Pores, draws: &[PosteriorDraw], end: &str) {
 }
 
 /// Returns √(c1111/ρ), m/s; `None` at a point whose mean model is not admissible.
-fn speed(pores: &Pores, point: &Point) -> Option<f64> {
-    pores.bulk_logarithm(point).ok().map(libm::exp)
+fn speed(structure: &BoneStructure, point: &Point) -> Option<f64> {
+    structure.bulk_logarithm(point).ok().map(libm::exp)
 }

@@ -3,7 +3,8 @@
 
 use std::fmt::{self, Write as _};
 
-use osteon_common::bone::{Bone, CaseBone};
+use osteon_common::bone::{Bone, CaseBone, Sublayer};
+use osteon_common::bone_structure::{BoneStructure, MeanSolid, MeanSublayer};
 use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::Elasticity;
 use osteon_common::field_path::entry_path;
@@ -13,7 +14,6 @@ use osteon_common::job::{
 };
 use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::Parameter;
-use osteon_common::pores::Pores;
 use osteon_common::porosity::{POROSITY, PorosityModel};
 use osteon_common::pulse::PulseForm;
 use osteon_common::setup_quantity::SetupQuantity;
@@ -36,9 +36,9 @@ pub fn case(case: &Case) -> String {
             CaseBone::Layered(sublayers) => sublayers,
         };
         setup(out, &case.setup, &[SetupQuantity::BoneThickness.mean_key()])?;
-        sublayers.iter().try_for_each(|sublayer| {
-            writeln!(out, "\n[[bone.sublayers]]\nthickness = {:?}  # m", sublayer.thickness)?;
-            solid(out, &sublayer.solid)
+        sublayers.iter().try_for_each(|Sublayer { thickness, solid: own }| {
+            sublayer(out, *thickness)?;
+            solid(out, own)
         })
     })
 }
@@ -49,8 +49,10 @@ pub fn case(case: &Case) -> String {
 /// [`JobSpecification::check`].
 pub fn job(specification: &JobSpecification) -> String {
     written(|out| {
-        setup(out, &specification.setup, &[])?;
-        pores(out, &specification.setup.pores)?;
+        let bone = &specification.setup.structure;
+        let whole = [SetupQuantity::BoneThickness.mean_key()];
+        setup(out, &specification.setup, if bone.is_layered() { &whole } else { &[] })?;
+        structure(out, bone)?;
         if let Some(given) = &specification.data {
             data(out, given)?;
         }
@@ -102,23 +104,33 @@ fn pulse(out: &mut String, form: &PulseForm) -> fmt::Result {
     }
 }
 
-/// Writes the section of a job's pores, if there are any.
-fn pores(out: &mut String, pores: &Pores) -> fmt::Result {
-    if !pores.is_any() {
+/// Writes the section of a job's pores or sublayers, if there are any.
+fn structure(out: &mut String, structure: &BoneStructure) -> fmt::Result {
+    if !structure.is_given() {
         return Ok(());
     }
-    let (mut profile, mut model) = (pores.profile.clone(), pores.model);
-    let porosity = match pores.porosity {
+    let (mut profile, mut model) = (structure.profile.clone(), structure.model);
+    let porosity = match structure.porosity {
         Some(porosity) => Some(format!("{porosity:?}")),
-        None => inline_table(&entries(&mut profile)),
+        None => inline_table(&entries(&mut profile)).filter(|_| !structure.is_layered()),
     };
-    writeln!(out, "\n[{}]", Pores::KEY.name)?;
-    for (key, text) in
-        [(POROSITY, porosity), (PorosityModel::KEY, inline_table(&entries(&mut model)))]
-    {
-        writeln!(out, "{} = {}", key.name, text.unwrap_or_default())?;
+    let model = inline_table(&entries(&mut model)).filter(|_| structure.has_pores());
+    writeln!(out, "\n[{}]", BoneStructure::KEY.name)?;
+    for (key, text) in [(POROSITY, porosity), (PorosityModel::KEY, model)] {
+        text.map_or(Ok(()), |text| writeln!(out, "{} = {text}", key.name))?;
     }
-    Ok(())
+    structure.sublayers.iter().try_for_each(|MeanSublayer { thickness, solid: mean }| {
+        sublayer(out, *thickness)?;
+        match mean {
+            MeanSolid::Porous(porosity) => writeln!(out, "{} = {porosity:?}", POROSITY.name),
+            MeanSolid::Given(bone) => solid(out, bone),
+        }
+    })
+}
+
+/// Writes the head of a sublayer, and its thickness.
+fn sublayer(out: &mut String, thickness: f64) -> fmt::Result {
+    writeln!(out, "\n[[bone.sublayers]]\nthickness = {thickness:?}  # m")
 }
 
 /// Removes the keys with these paths from the entries of a table.

@@ -94,7 +94,7 @@ const DEFAULT_SETUP: Setup = Setup {
         element_order: 8,
         time_step: None,
     },
-    pores: no_pores::NO_PORES,
+    structure: no_pores::NO_PORES,
 };
 
 #[test]
@@ -265,7 +265,7 @@ fn a_complete_job_means_what_it_says() {
             },
             picking: Picking { extremum: Extremum::Second, threshold: 0.06 },
             solver: SolverSettings { refinement: 1.5, ..SolverSettings::default() },
-            pores: DEFAULT_SETUP.pores,
+            structure: DEFAULT_SETUP.structure,
         }
     );
     // An integer stands for a number.

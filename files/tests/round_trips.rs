@@ -11,6 +11,7 @@ use std::path::Path;
 
 use osteon_common::attenuation::Attenuation;
 use osteon_common::bone::{Bone, CaseBone, Sublayer, Sublayers};
+use osteon_common::bone_structure::{BoneStructure, thickness};
 use osteon_common::case::{Case, Setup};
 use osteon_common::data::numbered;
 use osteon_common::job::{
@@ -23,7 +24,6 @@ use osteon_common::layers::{Fluid, Layers};
 use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::{PARAMETERS, Parameter};
-use osteon_common::pores::Pores;
 use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
@@ -95,7 +95,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                 },
                 picking: Picking { extremum, threshold },
                 solver,
-                pores: Pores::default(),
+                structure: BoneStructure::default(),
             }
         },
     )
@@ -218,7 +218,7 @@ fn scattered(
             SetupQuantity::CouplingSoundSpeed.value_in(setup).unwrap_or(0.0),
         ),
         probe_tilt: scatter(tilt, setup.probe.tilt),
-        porosity: scatter(porosity, setup.pores.porosity.unwrap_or(0.0)),
+        porosity: scatter(porosity, setup.structure.porosity.unwrap_or(0.0)),
         ..RandomQuantities::default()
     }
 }
@@ -302,8 +302,14 @@ fn job() -> impl Strategy<Value = JobSpecification> {
     );
     let objective = prop::sample::select(Objective::ALL.to_vec());
     let settings = (random(), monte_carlo(), search(), objective, posterior());
-    let setup = (setup(), prop::option::of(random_bones::pores()))
-        .prop_map(|(setup, pores)| Setup { pores: pores.unwrap_or_default(), ..setup });
+    let structure = prop_oneof![random_bones::structure(), random_bones::layered()];
+    let setup = (setup(), prop::option::of(structure)).prop_map(|(mut setup, structure)| {
+        setup.structure = structure.unwrap_or_default();
+        if setup.structure.is_layered() {
+            setup.layers.bone_thickness = thickness(&setup.structure.sublayers);
+        }
+        setup
+    });
     (any::<bool>(), setup, data(), parameters, settings).prop_map(
         |(identification, setup, data, parameters, settings)| {
             let mut data = data;

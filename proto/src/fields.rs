@@ -273,7 +273,7 @@ mod tests {
         check(&fields::entries(&mut setup.probe), &descriptor::<v1::Probe>());
         check(&fields::entries(&mut setup.picking), &descriptor::<v1::Picking>());
         check(&fields::entries(&mut setup.solver), &descriptor::<v1::SolverSettings>());
-        check(&fields::entries(&mut setup.pores), &descriptor::<v1::Bone>());
+        check(&fields::entries(&mut setup.structure), &descriptor::<v1::Bone>());
         check(&fields::entries(&mut MonteCarlo::default()), &descriptor::<v1::MonteCarlo>());
         check(&fields::entries(&mut Objective::default()), &descriptor::<v1::Objective>());
         check(&fields::entries(&mut Search::default()), &descriptor::<v1::Search>());

@@ -9,6 +9,7 @@
 
 pub mod announced;
 pub mod batch;
+mod bone_sublayers;
 pub mod choice;
 pub mod draws;
 pub mod evaluation;

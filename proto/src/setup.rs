@@ -8,6 +8,7 @@ use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::settings::{Picking, SolverSettings};
 use osteon_common::violations::Violations;
 
+use crate::bone_sublayers;
 use crate::fields;
 use crate::pulse;
 use crate::v1;
@@ -23,7 +24,7 @@ pub struct SetupMessages {
     pub picking: v1::Picking,
     /// Field `solver`.
     pub solver: v1::SolverSettings,
-    /// Field `bone`; `None` without pores.
+    /// Field `bone`; `None` without pores and sublayers.
     pub bone: Option<v1::Bone>,
 }
 
@@ -38,7 +39,10 @@ pub fn to_messages(setup: &Setup) -> SetupMessages {
         },
         picking: fields::to_message(&mut setup.picking),
         solver: fields::to_message(&mut setup.solver),
-        bone: setup.pores.is_any().then(|| fields::to_message(&mut setup.pores)),
+        bone: setup.structure.is_given().then(|| v1::Bone {
+            sublayers: bone_sublayers::to_messages(&setup.structure.sublayers),
+            ..fields::to_message(&mut setup.structure)
+        }),
     }
 }
 
@@ -63,7 +67,8 @@ pub fn from_messages(
             pulse.and_then(|message| pulse::from_message(message, violations)).unwrap_or_default();
     }
     if let Some(message) = bone {
-        fields::from_message("bone", message, &mut setup.pores, violations);
+        fields::from_message("bone", message, &mut setup.structure, violations);
+        bone_sublayers::from_messages(message, layers, &mut setup, violations);
     }
     setup.picking =
         picking.map_or(setup.picking, |message| picking_from_message(message, violations));

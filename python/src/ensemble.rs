@@ -30,7 +30,7 @@ impl PyEnsemble {
     /// # Errors
     /// If its bones have several tensors each.
     pub(crate) fn of_job(ensemble: Ensemble, setup: Setup) -> PyResult<Self> {
-        if setup.pores.profile.is_given() {
+        if setup.structure.profile.is_given() || setup.structure.is_layered() {
             let message = "changes through the thickness, so that each sublayer of a realization has a tensor of \
                            its own; `osteon draw` writes all of them";
             return Err(errors::bad_input("bone.porosity", message));

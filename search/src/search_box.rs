@@ -1,16 +1,16 @@
 //! The box of the free parameters, in units of its edges: each coordinate runs from 0 at the lower
 //! bound to 1 at the upper.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::ensemble::DISPERSION_MAX;
 use osteon_common::job::{ON_BOUND, Range};
 use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Parameter, Point};
-use osteon_common::pores::Pores;
 
 /// The ranges within which a search moves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchBox {
     ranges: [Range; PARAMETERS],
-    pores: Pores,
+    structure: BoneStructure,
 }
 
 /// The bound of a parameter on which a point lies.
@@ -26,23 +26,23 @@ impl SearchBox {
     /// Creates the box of these ranges, which are in the order of [`Parameter::ALL`] and have been
     /// checked.
     pub fn new(ranges: [Range; PARAMETERS]) -> Self {
-        Self { ranges, pores: Pores::default() }
+        Self { ranges, structure: BoneStructure::default() }
     }
 
     /// Returns the box for bones with these pores.
     #[must_use]
-    pub fn with_pores(self, pores: Pores) -> Self {
-        Self { pores, ..self }
+    pub fn with_structure(self, structure: BoneStructure) -> Self {
+        Self { structure, ..self }
     }
 
     /// Returns the pores of the setup; a point may have porosities of its own.
-    pub(crate) fn pores(&self) -> &Pores {
-        &self.pores
+    pub(crate) fn structure(&self) -> &BoneStructure {
+        &self.structure
     }
 
     /// Returns whether realizations can be drawn at a point.
     pub fn admits(&self, point: &Point) -> bool {
-        admissible(&self.pores, point)
+        admissible(&self.structure, point)
     }
 
     /// Returns the coordinates of the start.
@@ -61,7 +61,7 @@ impl SearchBox {
     pub fn started_at(&self, coordinates: &[f64]) -> Self {
         let mut coordinates = coordinates.iter();
         Self {
-            pores: self.pores.clone(),
+            structure: self.structure.clone(),
             ranges: self.ranges.map(|range| match range {
                 Range::Fixed(_) => range,
                 Range::Free { lower, upper, start } => match coordinates.next() {
@@ -115,9 +115,9 @@ impl SearchBox {
 }
 
 /// Returns whether realizations can be drawn at `point`, of a bone with these pores.
-pub fn admissible(pores: &Pores, point: &Point) -> bool {
+pub fn admissible(structure: &BoneStructure, point: &Point) -> bool {
     let dispersion = point.dispersion();
-    dispersion > 0.0 && dispersion < DISPERSION_MAX && pores.mean_solid(point).is_ok()
+    dispersion > 0.0 && dispersion < DISPERSION_MAX && structure.mean_solid(point).is_ok()
 }
 
 fn unit_start(range: &Range) -> Option<f64> {

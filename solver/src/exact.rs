@@ -165,6 +165,6 @@ pub(crate) fn has_tables_of(setup: &Setup, other: &Setup) -> bool {
     let mut alike = setup.clone();
     alike.layers.bone_thickness = other.layers.bone_thickness;
     alike.picking = other.picking;
-    alike.pores = other.pores.clone();
+    alike.structure = other.structure.clone();
     alike == *other && sampling::thinness(setup).to_bits() == sampling::thinness(other).to_bits()
 }

@@ -2,11 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
+use osteon_common::bone_structure::{PorosityProfile, ProfileShape};
 use osteon_common::case::Setup;
 use osteon_common::germ_source::{GermScheme, GermSource};
 use osteon_common::moments::Moments;
 use osteon_common::parameters::Point;
-use osteon_common::pores::{PorosityProfile, ProfileShape};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::realization::{Ensemble, mean_bone};
 use osteon_common::settings::SolverSettings;
@@ -94,13 +94,13 @@ fn moments_over_random_setups_are_those_of_quadrature_over_fixed_ones() {
     setup.layers.bone_attenuation.quality_factor = Some(15.0);
     check(SetupQuantity::BoneQualityFactor, &setup, 1.5, 1e-5);
     let mut setup = Setup::default();
-    setup.pores.porosity = Some(0.1);
+    setup.structure.porosity = Some(0.1);
     check(SetupQuantity::Porosity, &setup, 0.02, 1e-5);
-    setup.pores.porosity = None;
+    setup.structure.porosity = None;
     let PorosityProfile { sublayers, .. } = PorosityProfile::default();
     let (surface, marrow) = (Some(0.05), Some(0.15));
     let shape = ProfileShape::Endosteal;
-    setup.pores.profile =
+    setup.structure.profile =
         PorosityProfile { surface, marrow, shape, sublayers, ..PorosityProfile::default() };
     check(SetupQuantity::SurfacePorosity, &setup, 0.01, 1e-5);
     check(SetupQuantity::MarrowPorosity, &setup, 0.02, 1e-5);

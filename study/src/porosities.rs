@@ -2,6 +2,7 @@
 //! contain the true value; [`unmodelled`] measures the error of a model with one porosity when that of the
 //! bones changes through the thickness.
 
+use osteon_common::bone_structure::{BoneStructure, PorosityProfile, ProfileShape};
 use osteon_common::case::Setup;
 use osteon_common::inference::{DerivedQuantity, Uncertainty};
 use osteon_common::job::{
@@ -9,7 +10,6 @@ use osteon_common::job::{
     Search, SearchMethod,
 };
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
 use osteon_common::porosity::BoneMatrix;
 use osteon_common::posterior::Posterior;
 use osteon_common::quantile::quantile;
@@ -153,9 +153,11 @@ pub fn unmodelled(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTa
     for thickness in THICKNESSES {
         let mut setup = Setup::default();
         setup.layers.bone_thickness = thickness;
-        let velocities = |pores: Pores| {
-            let bones =
-                Surroundings { setup: Setup { pores, ..setup.clone() }, ..Surroundings::default() };
+        let velocities = |structure: BoneStructure| {
+            let bones = Surroundings {
+                setup: Setup { structure, ..setup.clone() },
+                ..Surroundings::default()
+            };
             bones.velocities(
                 &matrix_point(DISPERSION),
                 UNMODELLED_VELOCITIES,
@@ -166,9 +168,10 @@ pub fn unmodelled(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTa
         for (ends, shape) in UNMODELLED {
             let [surface, marrow] = ends.map(Some);
             let profile = PorosityProfile { surface, marrow, shape, ..PorosityProfile::default() };
-            let profiled = velocities(Pores { profile, ..Pores::default() })?;
+            let profiled = velocities(BoneStructure { profile, ..BoneStructure::default() })?;
             let mean = middle(ends);
-            let uniform = velocities(Pores { porosity: Some(mean), ..Pores::default() })?;
+            let uniform =
+                velocities(BoneStructure { porosity: Some(mean), ..BoneStructure::default() })?;
             let shift = mean_of(&profiled) - mean_of(&uniform);
             let found = identify_pores(&setup, profiled, twins)?;
             let value =
@@ -230,7 +233,7 @@ fn identify_bone(
     let mut draw = |[from, to]: [f64; 2]| generator.between(from, to);
     let truth = [draw(POROSITIES), draw(DISPERSIONS)];
     let mut bones = Surroundings::default();
-    bones.setup.pores.porosity = Some(truth[0]);
+    bones.setup.structure.porosity = Some(truth[0]);
     let most = COVERAGE_VELOCITIES.iter().max().copied().unwrap_or_default();
     let drawn = most as u64 + most as u64 / 20;
     let seed = data_seed(twins.seed, number);
@@ -255,7 +258,7 @@ fn identify_pores(
 ) -> Result<Option<[DerivedQuantity; 2]>, StudyError> {
     let mut specification = specification(setup, velocities, REALIZATIONS, twins.seed);
     let start = middle(POROSITIES);
-    specification.setup.pores.porosity = Some(start);
+    specification.setup.structure.porosity = Some(start);
     specification.parameters[Parameter::Porosity as usize] = free(POROSITY_BOUNDS, start);
     let found = identify(&specification, &mut RealizationCache::new(), twins.isa)?;
     Ok(found
@@ -275,7 +278,7 @@ fn posterior_of_bone(twins: &Twins, number: u64) -> Result<Option<(Point, Poster
     truth.0[Parameter::SurfacePorosity as usize] = surface;
     truth.0[Parameter::MarrowPorosity as usize] = marrow;
     let mut bones = Surroundings::default();
-    let profile = &mut bones.setup.pores.profile;
+    let profile = &mut bones.setup.structure.profile;
     (profile.surface, profile.marrow) = (Some(surface), Some(marrow));
     let seed = data_seed(twins.seed, number);
     let mut velocities = bones.velocities(&truth, 2 * PROFILE_VELOCITIES, seed, twins.isa)?;

@@ -10,6 +10,7 @@ use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::violations::Violations;
 
+use super::bone_structure::parameters_of_sublayers;
 use super::data::{data_from, no_data};
 use super::known_quantities::known_quantities;
 use super::observables::observables_of_job;
@@ -49,6 +50,7 @@ pub fn job_from(
     for parameter in Parameter::OF_BONE {
         range(parameter, specification.range(parameter), violations);
     }
+    parameters_of_sublayers(specification, violations);
     setup_parameters(specification, violations);
     known_quantities(specification, origin, violations);
     admissible_start(specification, violations);
@@ -84,11 +86,11 @@ fn admissible_start(specification: &JobSpecification, violations: &mut Violation
     if constants.any(wrong) {
         return;
     }
-    let (start, pores) = (specification.start(), &specification.setup.pores);
+    let (start, structure) = (specification.start(), &specification.setup.structure);
     let is_known = !["bone", "parameters"].iter().any(|field| violations.has_at_or_below(field));
     let refused = match start.constants().elasticity() {
         Err(inadmissible) => Some(inadmissible.to_string()),
-        Ok(_) if is_known => pores.mean_solid(&start).err().map(|none| none.to_string()),
+        Ok(_) if is_known => structure.mean_solid(&start).err().map(|none| none.to_string()),
         Ok(_) => None,
     };
     if let Some(refused) = refused {

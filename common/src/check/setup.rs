@@ -9,7 +9,7 @@ use crate::sampling::pair_count;
 use crate::settings::Method;
 use crate::violations::Violations;
 
-use super::pores::pores;
+use super::bone_structure::bone_structure;
 use super::pulse::pulse;
 use super::section::section;
 use super::value::{known_wrong, quantity};
@@ -24,7 +24,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
         }
         section(key.name, declared, default, violations);
     }
-    pores(&setup.pores, violations);
+    bone_structure(&setup.structure, violations);
     pulse(&setup.probe, violations);
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);

@@ -55,7 +55,7 @@ fn all_starts(
     let most = tolerance(specification).map_or(cost, |tolerance| tolerance.max(cost));
     let matching: Vec<Point> =
         points.iter().filter(|one| one.cost <= most).map(|one| one.point).collect();
-    let spread = spread(&matching, &specification.setup.pores);
+    let spread = spread(&matching, &specification.setup.structure);
     Solutions { points, matching: matching.len() as u64, spread }
 }
 

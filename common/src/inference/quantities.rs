@@ -60,7 +60,7 @@ pub(super) struct Quantities<'a> {
 impl Quantities<'_> {
     /// √(c1111/ρ). Its logarithm is close to normally distributed.
     pub(super) fn bulk_velocity(&self, free: &[Parameter]) -> Option<DerivedQuantity> {
-        let bulk = self.specification.setup.pores.bulk_velocity(&self.best.point).ok()?;
+        let bulk = self.specification.setup.structure.bulk_velocity(&self.best.point).ok()?;
         let slope = |&parameter: &Parameter| {
             bulk.gradient[parameter as usize] * self.specification.range(parameter).edge()
         };
@@ -128,7 +128,7 @@ impl Quantities<'_> {
     fn logarithm_at(&self, parameter: Parameter, value: f64) -> f64 {
         let mut point = self.best.point;
         point.0[parameter as usize] = value;
-        self.specification.setup.pores.bulk_logarithm(&point).unwrap_or(f64::INFINITY)
+        self.specification.setup.structure.bulk_logarithm(&point).unwrap_or(f64::INFINITY)
     }
 
     /// Returns a parameter whose interval ends where its law does, or its values.

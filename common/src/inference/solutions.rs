@@ -1,10 +1,10 @@
 //! Solutions of searches from several starts: a sample of the points that match the data equally
 //! well.
 
+use crate::bone_structure::BoneStructure;
 use crate::conclusions::{Solution, Spread, Spreads};
 use crate::elasticity::Elasticity;
 use crate::parameters::Point;
-use crate::pores::Pores;
 use crate::results::Evaluation;
 
 /// Returns the best point of each start of set number `set` that found a feasible one.
@@ -26,7 +26,7 @@ pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
 }
 
 /// Returns the spreads over points, of a bone with these pores; `None` if there are none.
-pub fn spread(points: &[Point], pores: &Pores) -> Option<Spreads> {
+pub fn spread(points: &[Point], structure: &BoneStructure) -> Option<Spreads> {
     let of = |values: &mut dyn Iterator<Item = f64>| {
         let mut spread = Spread { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, mean: 0.0 };
         for value in values {
@@ -41,7 +41,7 @@ pub fn spread(points: &[Point], pores: &Pores) -> Option<Spreads> {
         |(parameter, _)| (parameter, of(&mut points.iter().map(|point| point.get(parameter))));
     let parameters = first.given().map(of_parameter).collect();
     // Points that were evaluated are always admissible.
-    let mean = |point: &Point| Some(pores.mean_solid(point).ok()?.elasticity);
+    let mean = |point: &Point| Some(structure.mean_solid(point).ok()?.elasticity);
     let matrices: Vec<Elasticity> = points.iter().filter_map(mean).collect();
     let entries = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
     let entries =

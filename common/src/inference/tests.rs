@@ -1,6 +1,7 @@
 //! Tests of the inference with models whose solution is known.
 
 use super::*;
+use crate::bone_structure::BoneStructure;
 use crate::bulk_velocity::bulk_velocity;
 use crate::bulk_velocity::tests::{BOUNDS, OPTIMUM};
 use crate::case::Setup;
@@ -9,7 +10,6 @@ use crate::job::{Data, JobKind, Measurements, MonteCarlo, Objective, Range, Sear
 use crate::observables::PerObservable;
 use crate::outcome::FailureCounts;
 use crate::parameters::{Parameter, Point};
-use crate::pores::Pores;
 use crate::random_quantities::RandomQuantities;
 use crate::results::{Estimate, EvaluationRole, Moments};
 use crate::special::standard_normal_quantile;
@@ -335,11 +335,11 @@ fn solutions_are_the_best_of_each_start() {
     let seen = found.iter().map(|one| (one.start, one.point.density(), one.evaluations));
     assert!(seen.eq(expected), "{found:?}");
     let points: Vec<Point> = found.iter().map(|one| one.point).collect();
-    let Spreads { parameters, entries } = spread(&points, &Pores::default()).unwrap();
+    let Spreads { parameters, entries } = spread(&points, &BoneStructure::default()).unwrap();
     assert_eq!((parameters[0].1.smallest, parameters[0].1.largest), (1600.0, 1800.0));
     assert_eq!(entries.len(), 21);
     close(entries[0].2.smallest, OPTIMUM.constants().elasticity().unwrap().rows()[0][0], 1e-12);
-    assert_eq!(spread(&[], &Pores::default()), None);
+    assert_eq!(spread(&[], &BoneStructure::default()), None);
 }
 
 /// With noise as large as that of a few velocities, the ends of intervals stay where the law of the

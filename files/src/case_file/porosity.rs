@@ -2,15 +2,14 @@
 //! else sees it, as that of a material does.
 
 use osteon_common::bone::CaseBone;
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::case::Bone;
 use osteon_common::check;
-use osteon_common::parameters::Parameter;
-use osteon_common::pores::Pores;
 use osteon_common::porosity::{CasePorosityModel, NoPorousBone, POROSITY, PorosityModel};
 
-use crate::materials::{self, Material};
-use crate::pores;
+use crate::bone_structure;
 use crate::reader::{self, Reader, Table};
+use crate::solid;
 
 /// Path of the model in a case file.
 const MODEL_PATH: &str = "bone.porosity_model";
@@ -32,7 +31,7 @@ pub(super) fn bone(
     model: &CasePorosityModel,
 ) -> Option<Bone> {
     let path = table.path(POROSITY.name);
-    refuse_beside(reader, table, &path);
+    solid::refuse_beside_porosity(reader, table, &format!("{MODEL_PATH}.matrix"));
     let porosity = reader.number(table, POROSITY.name)?;
     check::porosity(&path, porosity, &mut reader.violations);
     if is_wrong(reader, &path) {
@@ -51,29 +50,16 @@ pub(super) fn profile(
     thickness: f64,
 ) -> Option<CaseBone> {
     let path = table.path(POROSITY.name);
-    refuse_beside(reader, table, &path);
-    let (porosity, profile) = pores::porosity(reader, table);
+    solid::refuse_beside_porosity(reader, table, &format!("{MODEL_PATH}.matrix"));
+    let (porosity, profile) = bone_structure::porosity(reader, table);
     check::porosity_profile(&path, &profile, &mut reader.violations);
     if is_wrong(reader, &path) {
         return None;
     }
-    let pores = Pores { porosity, profile, model: model.model };
-    let bone = pores.bone(&model.matrix, thickness, Ok::<_, NoPorousBone>);
+    let structure =
+        BoneStructure { porosity, profile, model: model.model, ..BoneStructure::default() };
+    let bone = structure.bone(&model.matrix, thickness, Ok::<_, NoPorousBone>);
     bone.map_err(|none| reader.violations.add(path, format!("has no bone: {none}"))).ok()
-}
-
-/// Refuses what a porosity replaces.
-fn refuse_beside(reader: &mut Reader, table: &Table<'_>, path: &str) {
-    let replaced = [materials::KEY, "mandel"].into_iter().chain(Material::HAS.map(Parameter::name));
-    let beside: Vec<_> = replaced.filter(|key| table.has(key)).collect();
-    if !beside.is_empty() {
-        let beside = beside.join(", ");
-        let message = format!(
-            "is given together with {beside}; density and elasticity follow from it: give one or the \
-             other (those of the bone between the pores belong to {MODEL_PATH}.matrix)"
-        );
-        reader.violations.add(path, message);
-    }
 }
 
 /// Returns whether the porosity, or the model, is known to be wrong.

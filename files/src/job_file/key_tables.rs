@@ -1,10 +1,10 @@
 //! The tables of `docs/job-files.md`, in Markdown.
 
+use osteon_common::bone_structure::PorosityProfile;
 use osteon_common::case::Setup;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, entries};
 use osteon_common::job::{PosteriorSettings, RunSettings};
 use osteon_common::parameters::{BONE_PARAMETERS, Parameter};
-use osteon_common::pores::PorosityProfile;
 use osteon_common::porosity::{self, CasePorosityModel, POROSITY, PorosityModel};
 
 use crate::toml_text;

@@ -1,5 +1,6 @@
 //! `[parameters]`: the range of each parameter.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::case::Setup;
 use osteon_common::fields::Key;
 use osteon_common::job::Range;
@@ -49,9 +50,11 @@ pub(super) fn read(reader: &mut Reader, root: &Table<'_>, setup: &Setup) -> [Ran
 fn base(reader: &mut Reader, table: &Table<'_>, setup: &Setup) -> Base {
     let named = Base::read(reader, table);
     match named {
-        Base::None if setup.pores.is_any() => Base::Matrix,
-        Base::Known(_) if setup.pores.is_any() => {
-            let message = "names a whole bone, and with bone.porosity the parameters are those of the bone \
+        Base::None if setup.structure.is_given() => Base::Matrix,
+        // The bone may have refused sublayers.
+        Base::None if reader.violations.has_at_or_below(BoneStructure::KEY.name) => Base::Unknown,
+        Base::Known(_) if setup.structure.is_given() => {
+            let message = "names a whole bone, and with bone.porosity or bone.sublayers the parameters are those of the bone \
                            between the pores; leave it out, and give those constants of it that \
                            you know";
             reader.violations.add(table.path(MATERIAL.name), message);

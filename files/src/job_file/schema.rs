@@ -1,13 +1,13 @@
 //! The JSON Schema of job files, by which editors complete them.
 
+use osteon_common::bone_structure::{BoneStructure, MeanSublayer, PorosityProfile};
 use osteon_common::case::Setup;
 use osteon_common::check::{COUNT, REPEATABILITY};
 use osteon_common::fields::{Choice, DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::observables::Observable;
 use osteon_common::parameters::Parameter;
-use osteon_common::pores::{Pores, PorosityProfile};
-use osteon_common::porosity::{POROSITY, PorosityModel};
+use osteon_common::porosity::{self, POROSITY, PorosityModel};
 use osteon_common::pulse::{PulseForm, TONE_CYCLES};
 use osteon_common::pulse_samples::{SAMPLES, STEP};
 use serde_json::{Map, Value as Json, json};
@@ -29,7 +29,8 @@ pub fn schema() -> String {
         properties.insert(key.name.to_owned(), described(table(&entries(section)), key));
     }
     properties["probe"]["properties"][PulseForm::KEY.name] = described(pulse(), PulseForm::KEY);
-    properties.insert(Pores::KEY.name.to_owned(), described(pores(), Pores::KEY));
+    properties
+        .insert(BoneStructure::KEY.name.to_owned(), described(structure(), BoneStructure::KEY));
     let data_key = Key { name: "data", meaning: "measured velocities, or their moments" };
     properties.insert(data_key.name.to_owned(), described(data(), data_key));
     let meaning = "the range of each parameter: fixed, or free between bounds";
@@ -150,13 +151,37 @@ fn pulse() -> Json {
     json!({ "anyOf": [{ "enum": names }, table] })
 }
 
-fn pores() -> Json {
+fn structure() -> Json {
     let one = number(None, Parameter::Porosity.row().accepted);
     let mut profile = table(&entries(&mut PorosityProfile::default()));
     profile["dependentRequired"] = json!({ "surface": ["marrow"], "marrow": ["surface"] });
     let model = described(table(&entries(&mut PorosityModel::default())), PorosityModel::KEY);
     let porosity = described(json!({ "anyOf": [one, profile] }), POROSITY);
-    object(json!({ POROSITY.name: porosity, PorosityModel::KEY.name: model }))
+    let list = described(sublayers(), BoneStructure::SUBLAYERS);
+    object(json!({
+        POROSITY.name: porosity,
+        PorosityModel::KEY.name: model,
+        BoneStructure::SUBLAYERS.name: list,
+    }))
+}
+
+fn sublayers() -> Json {
+    let row =
+        json!({ "type": "array", "items": { "type": "number" }, "minItems": 6, "maxItems": 6 });
+    let matrix = json!({ "type": "array", "items": row, "minItems": 6, "maxItems": 6 });
+    let mut properties = json!({
+        "thickness": said_to_be(number(None, MeanSublayer::THICKNESS), "thickness, m"),
+        "mandel": said_to_be(matrix, "elasticity: the Kelvin-Mandel matrix, Pa, in the order 11 22 33 23 31 12"),
+        materials::KEY: said_to_be(json!({ "enum": materials::NAMES }), "name of a material"),
+        POROSITY.name: said_to_be(number(None, porosity::ACCEPTED), "porosity, instead of all others"),
+    });
+    for parameter in Parameter::OF_BONE.into_iter().filter(|one| *one != Parameter::Dispersion) {
+        let value = number(None, parameter.row().accepted);
+        properties[parameter.name()] = said_to_be(value, &meaning(parameter));
+    }
+    let mut element = object(properties);
+    element["required"] = json!(["thickness"]);
+    json!({ "type": "array", "items": element, "minItems": 1, "maxItems": MeanSublayer::COUNT_MAX })
 }
 
 fn data() -> Json {

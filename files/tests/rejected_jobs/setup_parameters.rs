@@ -34,7 +34,7 @@ fn setup_parameters() {
 }
 
 #[test]
-fn pores() {
+fn structure() {
     let bone = |keys: &str| (FIRST, format!("[bone]\n{keys}\n\n{FIRST}"));
     let edits = [
         bone("porosity = 0.0"),

@@ -1,11 +1,14 @@
 //! Random elasticities, and random pores of a bone, all of them valid.
 
+use osteon_common::bone::Bone;
+use osteon_common::bone_structure::{
+    BoneStructure, MeanSolid, MeanSublayer, PorosityProfile, ProfileShape,
+};
 use osteon_common::elasticity::Elasticity;
-use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
 use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
 use proptest::prelude::*;
 
-pub(super) fn pores() -> impl Strategy<Value = Pores> {
+pub(super) fn structure() -> impl Strategy<Value = BoneStructure> {
     let shape = prop::sample::select(ProfileShape::ALL.to_vec());
     let homogenisation = prop::sample::select(Homogenisation::ALL.to_vec());
     let porosities = (any::<bool>(), 0.01..0.32, 0.01..0.32);
@@ -13,10 +16,10 @@ pub(super) fn pores() -> impl Strategy<Value = Pores> {
         |((is_profile, one, other), shape, sublayers, homogenisation, bulk_modulus, density)| {
             let model =
                 PorosityModel { homogenisation, fluid: PoreFluid { bulk_modulus, density } };
-            let mut pores = Pores { model, ..Pores::default() };
+            let mut structure = BoneStructure { model, ..BoneStructure::default() };
             if !is_profile {
-                pores.porosity = Some(one);
-                return pores;
+                structure.porosity = Some(one);
+                return structure;
             }
             let profile = PorosityProfile {
                 surface: Some(one),
@@ -25,7 +28,7 @@ pub(super) fn pores() -> impl Strategy<Value = Pores> {
                 sublayers,
                 ..PorosityProfile::default()
             };
-            pores.profile = match shape {
+            structure.profile = match shape {
                 ProfileShape::Linear => profile,
                 ProfileShape::Endosteal => PorosityProfile { sublayers: 6, ..profile },
                 ProfileShape::Table => PorosityProfile {
@@ -34,7 +37,26 @@ pub(super) fn pores() -> impl Strategy<Value = Pores> {
                     ..PorosityProfile::default()
                 },
             };
-            pores
+            structure
+        },
+    )
+}
+
+/// A bone of sublayers, of which at least one has a porosity.
+pub(super) fn layered() -> impl Strategy<Value = BoneStructure> {
+    let thickness = || 1e-4..1e-3;
+    let solid = (1500.0..2200.0, elasticity())
+        .prop_map(|(density, elasticity)| MeanSolid::Given(Box::new(Bone { density, elasticity })));
+    let solid = prop_oneof![(0.01..0.32).prop_map(MeanSolid::Porous), solid];
+    let lower = prop::collection::vec((thickness(), solid), 0..MeanSublayer::COUNT_MAX);
+    (0.01..0.32, thickness(), lower, 0.0..1e10).prop_map(
+        |(porosity, thickness, lower, bulk_modulus)| {
+            let first = (thickness, MeanSolid::Porous(porosity));
+            let sublayer = |(thickness, solid)| MeanSublayer { thickness, solid };
+            let sublayers = [first].into_iter().chain(lower).map(sublayer).collect();
+            let fluid = PoreFluid { bulk_modulus, ..PoreFluid::default() };
+            let model = PorosityModel { fluid, ..PorosityModel::default() };
+            BoneStructure { sublayers, model, ..BoneStructure::default() }
         },
     )
 }

@@ -1,9 +1,9 @@
-//! The pores that a job has by default: none.
+//! The pores and sublayers that a job has by default: none.
 
-use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
+use osteon_common::bone_structure::{BoneStructure, PorosityProfile, ProfileShape};
 use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
 
-pub(crate) const NO_PORES: Pores = Pores {
+pub(crate) const NO_PORES: BoneStructure = BoneStructure {
     porosity: None,
     profile: PorosityProfile {
         surface: None,
@@ -16,4 +16,5 @@ pub(crate) const NO_PORES: Pores = Pores {
         homogenisation: Homogenisation::MoriTanaka,
         fluid: PoreFluid { bulk_modulus: 2.3e9, density: 1000.0 },
     },
+    sublayers: Vec::new(),
 };

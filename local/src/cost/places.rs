@@ -22,7 +22,7 @@ pub(super) fn points(specification: &JobSpecification, count: usize) -> Vec<Poin
         return points;
     }
     points.push(slowest_corner(&ranges));
-    let space = SearchBox::new(ranges).with_pores(specification.setup.pores.clone());
+    let space = SearchBox::new(ranges).with_structure(specification.setup.structure.clone());
     let sequence = EvenSequence::new(free);
     let tried = (1..=TRIED_MAX * count).map(|number| space.point(&sequence.coordinates(number)));
     points.extend(tried);

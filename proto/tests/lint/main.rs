@@ -6,7 +6,7 @@
 
 mod comments;
 mod names;
-mod structure;
+mod bone_structure;
 
 use std::collections::BTreeSet;
 use std::fmt;

@@ -286,7 +286,7 @@ impl Model {
 /// coordinates.
 fn closed_form(space: &SearchBox, at: &[f64]) -> Option<(MomentVector, Rows)> {
     let point = space.point(at);
-    let velocity = space.pores().bulk_velocity(&point).ok()?;
+    let velocity = space.structure().bulk_velocity(&point).ok()?;
     let dispersion = point.dispersion();
     let mut of_dispersion = [0.0; PARAMETERS];
     of_dispersion[Parameter::Dispersion as usize] = 1.0 / dispersion;

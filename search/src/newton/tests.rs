@@ -1,11 +1,11 @@
 //! Tests with moments that follow the closed form nearly, hardly, or not at all; with infeasible
 //! regions; and with data out of reach.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::ensemble::Germs;
 use osteon_common::job::Range;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::pores::Pores;
 use osteon_common::statistics;
 use osteon_fuzz::properties;
 use proptest::prelude::*;
@@ -116,7 +116,7 @@ fn finish(
         };
         assert!(pending.iter().all(|u| (0.0..=1.0).contains(u)), "outside the box: {pending:?}");
         let point = space.point(&pending);
-        if !admissible(&Pores::default(), &point) {
+        if !admissible(&BoneStructure::default(), &point) {
             newton.refuse();
             continue;
         }
@@ -172,7 +172,7 @@ fn a_bone_is_found_in_a_few_evaluations() {
     let mut evaluations = Vec::new();
     for start in drawn.chain([hard]) {
         let space = all_free(&start);
-        if !admissible(&Pores::default(), &space.point(&space.start())) {
+        if !admissible(&BoneStructure::default(), &space.point(&space.start())) {
             continue;
         }
         let found = search(space, bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
@@ -195,7 +195,7 @@ fn a_search_from_the_solution_of_the_closed_form_takes_fewer_evaluations() {
     for index in 0..100 {
         let germs = Germs::draw(18, index);
         let space = all_free(&std::array::from_fn(|axis| germs.values()[axis]));
-        if !admissible(&Pores::default(), &space.point(&space.start())) {
+        if !admissible(&BoneStructure::default(), &space.point(&space.start())) {
             continue;
         }
         let usual = search(space.clone(), data, SETTINGS, |point| Some(bone(point)));
@@ -222,7 +222,7 @@ properties! {
     /// there by central differences of the moments themselves.
     fn the_answer_is_the_nearest_to_the_start(start in unit()) {
         let space = all_free(&start);
-        prop_assume!(admissible(&Pores::default(), &space.point(&space.start())));
+        prop_assume!(admissible(&BoneStructure::default(), &space.point(&space.start())));
         let found = search(space.clone(), bone(&OPTIMUM), SETTINGS, |point| Some(bone(point)));
         let (off, distance) = off_nearest(space, &found.at, &bone);
         // The largest of 2000 starts was 4.6 %, the median 1.1 %.
@@ -232,7 +232,7 @@ properties! {
     /// If the closed form is exact, there is nothing to learn: one step reaches the point.
     fn where_the_rule_holds_the_answer_is_exact(start in unit()) {
         let space = all_free(&start);
-        prop_assume!(admissible(&Pores::default(), &space.point(&space.start())));
+        prop_assume!(admissible(&BoneStructure::default(), &space.point(&space.start())));
         let found = search(space.clone(), rule(&OPTIMUM), SETTINGS, |point| Some(rule(point)));
         prop_assert_eq!(found.stop, StopReason::CostReached);
         let (off, _) = off_nearest(space, &found.at, &rule);
@@ -333,7 +333,8 @@ fn the_dispersion_alone_can_match_data_made_with_the_other_values() {
 /// Returns the lowest cost of one free coordinate, by an exhaustive search.
 fn least_of_one(space: SearchBox, data: Moments) -> f64 {
     let at = |k: u32| space.point(&[f64::from(k) / 100_000.0]);
-    let admissible = (0..=100_000).map(at).filter(|point| admissible(&Pores::default(), point));
+    let admissible =
+        (0..=100_000).map(at).filter(|point| admissible(&BoneStructure::default(), point));
     admissible.map(|point| statistics::cost(data, bone(&point))).fold(f64::INFINITY, f64::min)
 }
 
@@ -447,7 +448,7 @@ fn the_points_that_measure_slopes_are_foreseen() {
     let (mut foreseen, mut asked) = (Vec::<Vec<f64>>::new(), 0);
     while let Proposal::Evaluate(pending) = newton.ask() {
         let pending = pending.to_vec();
-        if !admissible(&Pores::default(), &space.point(&pending)) {
+        if !admissible(&BoneStructure::default(), &space.point(&pending)) {
             newton.refuse();
             foreseen.clear();
             continue;

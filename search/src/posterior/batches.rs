@@ -160,9 +160,9 @@ impl PosteriorSearch {
     fn learn(&mut self, point: &Point, moments: &ComparedMoments) {
         let Some(problem) = &self.problem else { return };
         let mut deviations = moments.in_logarithms(&problem.likelihood.data);
-        let Some(closed) = closed_form(&problem.pores, point) else { return };
+        let Some(closed) = closed_form(&problem.structure, point) else { return };
         deviations.iter_mut().zip(closed).for_each(|(one, closed)| *one -= closed);
-        if let Some(at) = features(&problem.pores, point)
+        if let Some(at) = features(&problem.structure, point)
             && deviations.iter().all(|deviation| deviation.is_finite())
         {
             self.surrogate.add(&at, deviations);
@@ -221,7 +221,7 @@ impl PosteriorSearch {
     /// noise.
     fn expected_errors(&self, problem: &PosteriorProblem, population: &Population) -> Vec<f64> {
         let of = |member: &Member| {
-            let at = features(&problem.pores, &member.point);
+            let at = features(&problem.structure, &member.point);
             let variances = at.map(|at| self.surrogate.variances(&at));
             variances.map_or(0.0, |found| problem.in_noise(found.into_iter()).min(ERROR_LIMIT))
         };

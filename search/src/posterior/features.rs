@@ -6,8 +6,8 @@
 //! 200 points the interpolated mean velocity was off by more than 3.7 data errors (of 2747
 //! velocities) at a twentieth of the test points in these, and by more than 0.7 in the ratios.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Parameter, ParameterScale, Point};
-use osteon_common::pores::Pores;
 
 /// Number of features.
 pub(super) const FEATURES: usize = PARAMETERS;
@@ -19,8 +19,8 @@ pub(super) type Features = [f64; FEATURES];
 /// ln δ of the mean model at a point, and of the parameters of the setup the porosities and the logarithms
 /// of the others, or 0 if they are not searched; `None` where the model is not admissible. With `pores`,
 /// ln(c1111/ρ) is that of the porous bone, and the ratios are those between the pores.
-pub(super) fn features(pores: &Pores, point: &Point) -> Option<Features> {
-    let bulk_logarithm = pores.bulk_logarithm(point).ok()?;
+pub(super) fn features(structure: &BoneStructure, point: &Point) -> Option<Features> {
+    let bulk_logarithm = structure.bulk_logarithm(point).ok()?;
     let [density, e_l, nu_l, g_l, e_t, nu_t, dispersion, ..] = point.0;
     let of_setup = Parameter::OF_SETUP.map(|parameter| match parameter.row().scale {
         _ if !point.has(parameter) => 0.0,
@@ -88,7 +88,7 @@ mod tests {
         ];
         let mut point = point;
         point.0[Parameter::BoneQualityFactor as usize] = 15.0;
-        let found = features(&Pores::default(), &point).unwrap();
+        let found = features(&BoneStructure::default(), &point).unwrap();
         for (found, expected) in found.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }

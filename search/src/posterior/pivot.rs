@@ -5,9 +5,9 @@
 //! from the data's likelihood, and two parameters, the pivots, are solved for: the dispersion, for
 //! the coefficient of variation, and another one for the mean velocity.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::bulk_velocity::bulk_velocity;
 use osteon_common::parameters::{PARAMETERS, Parameter, Point};
-use osteon_common::pores::Pores;
 
 use super::prior::ParameterPrior;
 
@@ -26,9 +26,9 @@ impl Pivots {
     /// leaves it most uncertain, at the point `at` of the other medians, of a bone with these pores. The
     /// longitudinal Young modulus is chosen only if there is no other, because up to two of its values give
     /// the same velocity.
-    pub(super) fn choose(priors: &[ParameterPrior], pores: &Pores, at: &Point) -> Self {
+    pub(super) fn choose(priors: &[ParameterPrior], structure: &BoneStructure, at: &Point) -> Self {
         let gradient =
-            pores.bulk_velocity(at).map_or([1.0; PARAMETERS], |velocity| velocity.gradient);
+            structure.bulk_velocity(at).map_or([1.0; PARAMETERS], |velocity| velocity.gradient);
         let free = priors.iter().filter(|prior| is_in_closed_form(prior.parameter));
         let influence = |prior: &&ParameterPrior| {
             let whole = (gradient[prior.parameter as usize] * prior.middle_half()).abs();
@@ -64,19 +64,19 @@ fn is_in_closed_form(parameter: Parameter) -> bool {
 /// Returns the value of `pivot` with which `point` has this ln √(c1111/ρ), of a bone with these pores, or
 /// nearly that value if the bone has any: a few repetitions from the value found make it exact.
 pub(super) fn solve(
-    pores: &Pores,
+    structure: &BoneStructure,
     point: &Point,
     pivot: Parameter,
     logarithm: f64,
     branch: usize,
 ) -> Option<f64> {
     if Parameter::OF_PORES.contains(&pivot) {
-        let slope = pores.bulk_slope(point, pivot).ok()?;
-        let step = (logarithm - pores.bulk_logarithm(point).ok()?) / slope;
+        let slope = structure.bulk_slope(point, pivot).ok()?;
+        let step = (logarithm - structure.bulk_logarithm(point).ok()?) / slope;
         return Some(point.get(pivot) + step).filter(|value| value.is_finite());
     }
     // The pores change the logarithm by an amount that hardly depends on the pivot.
-    let by_pores = pores.bulk_logarithm(point).ok()? - bulk_velocity(point).ok()?.logarithm;
+    let by_pores = structure.bulk_logarithm(point).ok()? - bulk_velocity(point).ok()?.logarithm;
     solve_solid(point, pivot, logarithm - by_pores, branch)
 }
 

@@ -4,12 +4,12 @@
 //! parameters from the prior, but for the pivots, which are solved for (`pivot.rs`). A point's weight
 //! is posterior density over density of its draw; with the pivots z it is π(z) L(y)/(q(y) |∂y/∂z|).
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::ensemble::GERMS;
 use osteon_common::germ_source::sobol_points;
 use osteon_common::job::JobSpecification;
 use osteon_common::moments::MomentVector;
 use osteon_common::parameters::{PARAMETERS, Parameter, Point};
-use osteon_common::pores::Pores;
 
 use super::draw_law::DrawLaw;
 use super::features::{Features, features};
@@ -52,7 +52,7 @@ pub(super) struct PosteriorProblem {
     pub(super) priors: Vec<ParameterPrior>,
     pub(super) scale: Scale,
     /// Pores of the setup.
-    pub(super) pores: Pores,
+    pub(super) structure: BoneStructure,
     /// Values of the fixed parameters, and medians of the others.
     base: Point,
     pivots: Pivots,
@@ -93,10 +93,10 @@ impl PosteriorProblem {
             base.0[prior.parameter as usize] = prior.quantile(0.5);
         }
         let seed = specification.monte_carlo.seed;
-        let pores = specification.setup.pores.clone();
-        let points = prior_points((&priors, &pores), &base, seed, PRIOR_POINTS);
+        let structure = specification.setup.structure.clone();
+        let points = prior_points((&priors, &structure), &base, seed, PRIOR_POINTS);
         let sample: Vec<Features> =
-            points.iter().filter_map(|point| features(&pores, point)).collect();
+            points.iter().filter_map(|point| features(&structure, point)).collect();
         if priors.is_empty() || sample.is_empty() {
             return None;
         }
@@ -107,9 +107,9 @@ impl PosteriorProblem {
         };
         let reach = [reach(0, |one| 0.5 * one[5]), reach(1, |one| one[6])];
         let grid = MomentsGrid::new(&likelihood.velocities, reach);
-        let pivots = Pivots::choose(&priors, &pores, points.first().unwrap_or(&base));
+        let pivots = Pivots::choose(&priors, &structure, points.first().unwrap_or(&base));
         let scale = Scale::from_sample(&sample);
-        Some(Self { likelihood, priors, scale, pores, base, pivots, reach, grid, seed })
+        Some(Self { likelihood, priors, scale, structure, base, pivots, reach, grid, seed })
     }
 
     /// Returns the problem with a model whose moments have these relative standard errors.
@@ -121,7 +121,7 @@ impl PosteriorProblem {
 
     /// Returns admissible points drawn from the prior; at most `count`.
     pub(super) fn prior_points(&self, count: u64) -> Vec<Point> {
-        prior_points((&self.priors, &self.pores), &self.base, self.seed, count)
+        prior_points((&self.priors, &self.structure), &self.base, self.seed, count)
     }
 
     /// Draws the population of an interpolated model from `count` Sobol' points; `number` chooses
@@ -215,10 +215,10 @@ impl PosteriorProblem {
         for prior in self.priors.iter().filter(|prior| self.is_pivot(prior.parameter)) {
             log_prior += prior.log_density(point.get(prior.parameter))?;
         }
-        if !admissible(&self.pores, &point) {
+        if !admissible(&self.structure, &point) {
             return None;
         }
-        let moments = moments(model, &self.pores, &point)?;
+        let moments = moments(model, &self.structure, &point)?;
         let jacobian = self.jacobian(model, &point, [moments[0], moments[1]])?;
         let log_law = law.map_or(0.0, |law| law.log_density(&drawn));
         let log_weight = log_prior + self.likelihood.log(&moments)
@@ -238,7 +238,7 @@ impl PosteriorProblem {
         wanted: [f64; 2],
         branch: usize,
     ) -> Option<Point> {
-        let first = features(&self.pores, &point).map(|at| model.mean_of_velocities(&at));
+        let first = features(&self.structure, &point).map(|at| model.mean_of_velocities(&at));
         let mut deviations = first.unwrap_or([RULE_OF_THUMB[0], RULE_OF_THUMB[1]]);
         for _ in 0..CORRECTIONS_MAX {
             if self.pivots.dispersion {
@@ -247,17 +247,17 @@ impl PosteriorProblem {
             }
             if let Some(pivot) = self.pivots.mean {
                 let wanted = wanted[0] - deviations[0];
-                let value = solve(&self.pores, &point, pivot, wanted, branch)?;
+                let value = solve(&self.structure, &point, pivot, wanted, branch)?;
                 self.set(&mut point, pivot, value)?;
             }
-            let found = model.mean_of_velocities(&features(&self.pores, &point)?);
+            let found = model.mean_of_velocities(&features(&self.structure, &point)?);
             let change = (found[0] - deviations[0]).abs().max((found[1] - deviations[1]).abs());
             deviations = found;
             if change <= CORRECTED {
                 break;
             }
         }
-        let closed = closed_form(&self.pores, &point)?;
+        let closed = closed_form(&self.structure, &point)?;
         let is_solved =
             |k: usize| (closed[k] + deviations[k] - wanted[k]).abs() <= UNSOLVED || !self.solves(k);
         (is_solved(0) && is_solved(1)).then_some(point)
@@ -286,7 +286,7 @@ impl PosteriorProblem {
             let step = STEP * (prior.upper - prior.lower);
             let mut beside = *point;
             beside.0[parameter as usize] -= step;
-            let found = moments_of_velocities(model, &self.pores, &beside)?;
+            let found = moments_of_velocities(model, &self.structure, &beside)?;
             Some([0, 1].map(|k| (at[k] - found[k]) / step))
         };
         let determinant = match (self.pivots.mean, self.pivots.dispersion) {
@@ -371,26 +371,34 @@ pub(super) fn normalised(logs: &[f64]) -> Vec<f64> {
 }
 
 /// Returns the compared moments of an interpolated model at a point, in logarithms.
-pub(super) fn moments(model: &Surrogate, pores: &Pores, point: &Point) -> Option<MomentVector> {
-    let mut found = model.mean(&features(pores, point)?);
-    found.iter_mut().zip(closed_form(pores, point)?).for_each(|(one, closed)| *one += closed);
+pub(super) fn moments(
+    model: &Surrogate,
+    structure: &BoneStructure,
+    point: &Point,
+) -> Option<MomentVector> {
+    let mut found = model.mean(&features(structure, point)?);
+    found.iter_mut().zip(closed_form(structure, point)?).for_each(|(one, closed)| *one += closed);
     Some(found)
 }
 
 /// Returns ln v and ln Δ of an interpolated model at a point.
-fn moments_of_velocities(model: &Surrogate, pores: &Pores, point: &Point) -> Option<[f64; 2]> {
-    let [mean, variation] = model.mean_of_velocities(&features(pores, point)?);
-    let closed = closed_form(pores, point)?;
+fn moments_of_velocities(
+    model: &Surrogate,
+    structure: &BoneStructure,
+    point: &Point,
+) -> Option<[f64; 2]> {
+    let [mean, variation] = model.mean_of_velocities(&features(structure, point)?);
+    let closed = closed_form(structure, point)?;
     Some([closed[0] + mean, closed[1] + variation])
 }
 
 /// Returns ln √(c1111/ρ) and ln δ at a point.
-pub(crate) fn closed_form(pores: &Pores, point: &Point) -> Option<[f64; 2]> {
-    Some([pores.bulk_logarithm(point).ok()?, libm::log(point.dispersion())])
+pub(crate) fn closed_form(structure: &BoneStructure, point: &Point) -> Option<[f64; 2]> {
+    Some([structure.bulk_logarithm(point).ok()?, libm::log(point.dispersion())])
 }
 
 fn prior_points(
-    (priors, pores): (&[ParameterPrior], &Pores),
+    (priors, structure): (&[ParameterPrior], &BoneStructure),
     base: &Point,
     seed: u64,
     count: u64,
@@ -403,5 +411,5 @@ fn prior_points(
         }
         point
     };
-    drawn.iter().map(point).filter(|point| admissible(pores, point)).collect()
+    drawn.iter().map(point).filter(|point| admissible(structure, point)).collect()
 }

@@ -1,11 +1,11 @@
 //! Summaries of a population, and the result that they make up.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::data_likelihood::MODEL_ERROR_MAX;
 use osteon_common::data_statistics::{FittedMoments, predictive_test};
 use osteon_common::job::JobSpecification;
 use osteon_common::moments::MomentVector;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::pores::Pores;
 use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANTILE_LEVELS};
 use osteon_common::results::{BestPoint, Moments};
 
@@ -64,9 +64,10 @@ impl PosteriorSearch {
             mean,
             coefficient_of_variation: variation,
             bulk_velocity: of(&|point| {
-                closed_form(&problem.pores, point).map_or(f64::NAN, |closed| libm::exp(closed[0]))
+                closed_form(&problem.structure, point)
+                    .map_or(f64::NAN, |closed| libm::exp(closed[0]))
             }),
-            entries: entries(&population, &prior, &problem.pores),
+            entries: entries(&population, &prior, &problem.structure),
             predictive_p_value: None,
             outlier_share: problem.likelihood.velocities.outlier_share(at).map(|share| share.mean),
             draws: draws(&population, problem, count),
@@ -85,7 +86,7 @@ impl PosteriorSearch {
 
     /// Returns mean or coefficient of variation of the interpolated model.
     fn moment(&self, problem: &PosteriorProblem, point: &Point, axis: usize) -> f64 {
-        moments_of(&self.surrogate, &problem.pores, point)
+        moments_of(&self.surrogate, &problem.structure, point)
             .map_or(f64::NAN, |found| libm::exp(found[axis]))
     }
 
@@ -226,10 +227,10 @@ fn correlation(population: &Population, free: &[Parameter]) -> Vec<Vec<f64>> {
 fn entries(
     population: &Population,
     prior: &[Point],
-    pores: &Pores,
+    structure: &BoneStructure,
 ) -> Vec<(usize, usize, PosteriorSummary)> {
     let entry = |point: &Point, row: usize, column: usize| {
-        let solid = pores.mean_solid(point);
+        let solid = structure.mean_solid(point);
         solid.map_or(f64::NAN, |solid| solid.elasticity.rows()[row][column])
     };
     let places = (0..6).flat_map(|row| (row..6).map(move |column| (row, column)));

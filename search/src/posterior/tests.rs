@@ -1,6 +1,7 @@
 //! Posteriors of a model whose moments are known in closed form, so that they can be computed by
 //! other means.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::case::Setup;
 use osteon_common::data_likelihood::DataLikelihood;
 use osteon_common::germ_source::sobol_points;
@@ -10,7 +11,6 @@ use osteon_common::job::{
 };
 use osteon_common::moments::MOMENTS;
 use osteon_common::parameters::{Parameter, Point};
-use osteon_common::pores::Pores;
 use osteon_common::posterior::{Posterior, PosteriorSummary};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::Moments;
@@ -34,8 +34,8 @@ const BOUNDS: [[f64; 2]; 7] = [
 
 /// A model that deviates from the closed form about as a bone in a plate does: by up to 2 %.
 fn model(point: &Point) -> Option<Moments> {
-    let closed = closed_form(&Pores::default(), point)?;
-    let at = features(&Pores::default(), point)?;
+    let closed = closed_form(&BoneStructure::default(), point)?;
+    let at = features(&BoneStructure::default(), point)?;
     let mean = -0.012 + 0.02 * at[0] * at[1] - 0.03 * at[2] * at[2];
     let variation = -1.33 + 0.1 * at[1] * at[1] + 0.03 * libm::exp(2.0 * at[6]);
     let [mean, variation] = [closed[0] + mean, closed[1] + variation];
@@ -44,7 +44,7 @@ fn model(point: &Point) -> Option<Moments> {
 
 /// A model such as that of a thin plate at a low frequency: slower than the rule of thumb by 8 %.
 fn slow_model(point: &Point) -> Option<Moments> {
-    let [mean, variation] = closed_form(&Pores::default(), point)?;
+    let [mean, variation] = closed_form(&BoneStructure::default(), point)?;
     let [mean, variation] = [mean - 0.08, variation - 1.1];
     Some(Moments { mean: libm::exp(mean), coefficient_of_variation: libm::exp(variation) })
 }

@@ -446,8 +446,8 @@ fn method_of_start(
 /// Returns the box for one of the searches for a set of data. Its start is that of the parameters, or a
 /// random point, which is the same for every set.
 fn space_of_start(specification: &JobSpecification, set: usize, start: u32) -> SearchBox {
-    let space =
-        SearchBox::new(specification.ranges_of(set)).with_pores(specification.setup.pores.clone());
+    let space = SearchBox::new(specification.ranges_of(set))
+        .with_structure(specification.setup.structure.clone());
     let start = specification.search.first_start + u64::from(start);
     if start == 0 {
         return space;
@@ -476,7 +476,7 @@ fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Parameter
         };
         let steps = [value + step, value - step].into_iter();
         let mut within = steps.filter(|value| (lower..=upper).contains(value)).map(moved);
-        within.find(|(_, point)| admissible(&specification.setup.pores, point))
+        within.find(|(_, point)| admissible(&specification.setup.structure, point))
     };
     Parameter::ALL.into_iter().rev().filter_map(beside).collect()
 }

@@ -266,8 +266,9 @@ fn holds_back(
     };
     let mut beyond = *point;
     beyond.0[parameter as usize] += step * specification.range(parameter).edge();
-    let pores = &specification.setup.pores;
-    let Some((before, after)) = closed_form(pores, point).zip(closed_form(pores, &beyond)) else {
+    let structure = &specification.setup.structure;
+    let Some((before, after)) = closed_form(structure, point).zip(closed_form(structure, &beyond))
+    else {
         return true;
     };
     let errors = agreement.errors.unwrap_or([1.0; MOMENTS]);

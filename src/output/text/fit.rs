@@ -146,7 +146,9 @@ pub(super) fn uniqueness(
     let free = |parameter| matches!(specification.range(parameter), Range::Free { .. });
     let searched = Parameter::ALL.into_iter().filter(|&parameter| free(parameter)).count();
     let dispersion = free(Parameter::Dispersion);
-    let Ok(speed) = specification.setup.pores.bulk_logarithm(point) else { return String::new() };
+    let Ok(speed) = specification.setup.structure.bulk_logarithm(point) else {
+        return String::new();
+    };
     let speed = speed.exp();
     let speed = glued(&format!("√(c1111/ρ) = {} m/s", digits(speed, DIGITS)));
     let shown_below = identified::has_intervals(found);

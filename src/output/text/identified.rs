@@ -1,9 +1,9 @@
 //! The conclusions from the data as text.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::inference::Spread;
 use osteon_common::job::Objective;
 use osteon_common::parameters::Parameter;
-use osteon_common::pores::Pores;
 use osteon_files::report::{Identification, Identified, Moments, QuantityEstimate, Solution};
 
 use super::layout::{aligned, glued, wrapped};
@@ -28,7 +28,7 @@ fn has_confidence_intervals(found: &Identification) -> bool {
 
 /// Returns the posterior or, without one, the intervals of the identified quantities, and what
 /// remains undetermined; empty if nothing is known.
-pub(super) fn text(found: &Identification, pores: &Pores) -> String {
+pub(super) fn text(found: &Identification, structure: &BoneStructure) -> String {
     let mut text = String::new();
     if let Some(known) = found.posterior() {
         text.push_str(&posterior::text(known));
@@ -39,7 +39,7 @@ pub(super) fn text(found: &Identification, pores: &Pores) -> String {
             aligned(&rows(known))
         ));
     }
-    text.push_str(&solutions(found, pores));
+    text.push_str(&solutions(found, structure));
     // Evaluations are counted from 0.
     let later = |from: &u64| from + 1 < found.evaluations;
     if let Some(from) = found.search.below_noise_from.filter(later) {
@@ -108,7 +108,7 @@ fn heading(known: &Identified, objective: Objective) -> String {
 }
 
 /// Describes how far apart the solutions of several starts are.
-fn solutions(found: &Identification, pores: &Pores) -> String {
+fn solutions(found: &Identification, structure: &BoneStructure) -> String {
     let Some(solutions) = found.solutions.as_ref().filter(|found| found.matching > 1) else {
         return String::new();
     };
@@ -119,7 +119,7 @@ fn solutions(found: &Identification, pores: &Pores) -> String {
         [readable(*parameter), format!("{}{unit}", range(ends))]
     };
     let mut rows = Vec::new();
-    let speeds = speeds(found, &solutions.points, pores);
+    let speeds = speeds(found, &solutions.points, structure);
     rows.extend(speeds.map(|ends| [SPEED.to_owned(), format!("{} m/s", range(ends))]));
     rows.extend(spreads.map(row));
     let matching = solutions.matching;
@@ -151,14 +151,18 @@ fn range([smallest, largest]: [f64; 2]) -> String {
 }
 
 /// Returns the smallest and the largest √(c1111/ρ) of the points that match the data, m/s.
-fn speeds(found: &Identification, points: &[Solution], pores: &Pores) -> Option<[f64; 2]> {
+fn speeds(
+    found: &Identification,
+    points: &[Solution],
+    structure: &BoneStructure,
+) -> Option<[f64; 2]> {
     // Same criterion as for counting the solutions: a likelihood has no cost that is low enough.
     let best = found.cost?;
     let most = found.search.cost_tolerance.map_or(best, |most| most.max(best));
     let matching = points.iter().filter(|one| one.cost.is_some_and(|cost| cost <= most));
     let speeds = matching.filter_map(|one| {
         let point = one.parameters.point(one.dispersion)?;
-        Some(pores.bulk_logarithm(&point).ok()?.exp())
+        Some(structure.bulk_logarithm(&point).ok()?.exp())
     });
     let ends = speeds.fold([f64::INFINITY, f64::NEG_INFINITY], |[smallest, largest], speed| {
         [speed.min(smallest), speed.max(largest)]

@@ -121,7 +121,7 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
     }
     if fit::fits(found, specification) {
         text.push_str(&fit::uniqueness(found, &point, specification));
-        text.push_str(&identified::text(found, &specification.setup.pores));
+        text.push_str(&identified::text(found, &specification.setup.structure));
     } else {
         text.push_str(&fit::misfit(found, &point, specification));
         let of_posterior = match fit::has_outliers(found) {

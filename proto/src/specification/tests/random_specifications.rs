@@ -1,5 +1,8 @@
 //! Random specifications, all of them valid.
 
+use osteon_common::bone_structure::{
+    BoneStructure, MeanSolid, MeanSublayer, PorosityProfile, ProfileShape, thickness,
+};
 use osteon_common::case::Setup;
 use osteon_common::fluid_sublayers::{FluidSublayer, FluidSublayers};
 use osteon_common::job::{
@@ -8,8 +11,7 @@ use osteon_common::job::{
 use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::extended;
-use osteon_common::pores::{Pores, PorosityProfile, ProfileShape};
-use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
+use osteon_common::porosity::{BoneMatrix, Homogenisation, PoreFluid, PorosityModel};
 use osteon_common::pulse::PulseForm;
 use osteon_common::pulse_samples::PulseSamples;
 use osteon_common::random_quantities::{RandomDistribution, Scatter};
@@ -141,7 +143,7 @@ fn random() -> impl Strategy<Value = RandomQuantities> {
     })
 }
 
-fn pores() -> impl Strategy<Value = Pores> {
+fn structure() -> impl Strategy<Value = BoneStructure> {
     let shape = proptest::sample::select(ProfileShape::ALL.to_vec());
     let homogenisation = proptest::sample::select(Homogenisation::ALL.to_vec());
     let profile = (0.06..0.3, 0.06..0.3, shape, 2_u32..=16);
@@ -157,21 +159,44 @@ fn pores() -> impl Strategy<Value = Pores> {
             let end = |value| Some(value).filter(|_| !is_table);
             let [surface, marrow] = [surface, marrow].map(end);
             match is_profile {
-                true => Pores {
+                true => BoneStructure {
                     porosity: None,
                     profile: PorosityProfile { surface, marrow, shape, sublayers, values },
                     model,
+                    sublayers: Vec::new(),
                 },
-                false => Pores { porosity: Some(0.1), profile: default, model },
+                false => BoneStructure { porosity: Some(0.1), model, ..BoneStructure::default() },
             }
         },
     )
 }
 
+/// A bone of sublayers, of which the first has a porosity.
+fn sublayers() -> impl Strategy<Value = BoneStructure> {
+    let thickness = || 1e-4..1e-3;
+    let porous = || (0.06..0.3).prop_map(MeanSolid::Porous);
+    let given = (1500.0..2000.0).prop_map(|density| {
+        let bone = BoneMatrix { density, ..BoneMatrix::default() }.bone();
+        MeanSolid::Given(Box::new(bone.unwrap()))
+    });
+    let solid = prop_oneof![porous(), given];
+    let lower = proptest::collection::vec((thickness(), solid), 0..MeanSublayer::COUNT_MAX);
+    ((thickness(), porous()), lower).prop_map(|(first, lower)| {
+        let sublayer = |(thickness, solid)| MeanSublayer { thickness, solid };
+        let sublayers = [first].into_iter().chain(lower).map(sublayer).collect();
+        BoneStructure { sublayers, ..BoneStructure::default() }
+    })
+}
+
 fn setup() -> impl Strategy<Value = Setup> {
-    let pores = proptest::option::of(pores());
-    (layered(), pores)
-        .prop_map(|(setup, pores)| Setup { pores: pores.unwrap_or_default(), ..setup })
+    let structure = proptest::option::of(prop_oneof![structure(), sublayers()]);
+    (layered(), structure).prop_map(|(mut setup, structure)| {
+        setup.structure = structure.unwrap_or_default();
+        if setup.structure.is_layered() {
+            setup.layers.bone_thickness = thickness(&setup.structure.sublayers);
+        }
+        setup
+    })
 }
 
 /// A peak and a trough of about 1 MHz.

@@ -118,7 +118,7 @@ fn starts() -> impl Iterator<Item = (u64, [f64; 7])> {
         (index, start)
     });
     starts.filter(|(_, start)| {
-        admissible(&Pores::default(), &all_free(start).point(&all_free(start).start()))
+        admissible(&BoneStructure::default(), &all_free(start).point(&all_free(start).start()))
     })
 }
 

@@ -1,7 +1,10 @@
-//! The pores of a job's bone: their porosity is a quantity of the setup, as the bone's thickness is.
+//! What a job's bone consists of: one solid, pores, or sublayers.
 //!
-//! Where there is a porosity, the mean model of a point (density and engineering constants) is that of the
-//! bone between the pores, and density and mean elasticity of the bone follow by a [`PorosityModel`].
+//! A porosity is a quantity of the setup, as the bone's thickness is. Where there is one, the mean model of a
+//! point (density and engineering constants) is that of the bone between the pores, and density and mean
+//! elasticity of the bone follow by a [`PorosityModel`].
+
+mod sublayers;
 
 use crate::accepted::WholeRange;
 use crate::bone::{Bone, CaseBone, Sublayer, Sublayers};
@@ -11,6 +14,8 @@ use crate::limits::SUBLAYERS_MAX;
 use crate::parameters::{PARAMETERS, Parameter, Point};
 use crate::plausible;
 use crate::porosity::{self, BoneMatrix, NoPorousBone, PorosityModel};
+
+pub use self::sublayers::{MeanSolid, MeanSublayer, thickness};
 
 fields::choices!(ProfileShape);
 
@@ -50,15 +55,18 @@ pub struct PorosityProfile {
     pub values: Vec<f64>,
 }
 
-/// The pores of the bone; without any porosity there are none.
+/// The pores or the sublayers of the bone; by default it is one solid without pores.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Pores {
+pub struct BoneStructure {
     /// The porosity, if it is the same through the thickness.
     pub porosity: Option<f64>,
     /// The porosity, if it is not.
     pub profile: PorosityProfile,
-    /// How density and elasticity follow.
+    /// How density and elasticity follow from a porosity.
     pub model: PorosityModel,
+    /// Sublayers from the skin's side to the marrow's, if it has any. Then there is neither of the two
+    /// porosities above, and the setup's thickness is that of all together.
+    pub sublayers: Vec<MeanSublayer>,
 }
 
 impl ProfileShape {
@@ -119,20 +127,36 @@ impl PorosityProfile {
     }
 }
 
-impl Pores {
+impl BoneStructure {
     /// The section of a job file that has them.
     pub const KEY: Key = Key {
         name: "bone",
-        meaning: "pores of the bone: with a porosity, density and constants in `parameters` are those of \
-                  the bone between the pores",
+        meaning: "pores or sublayers of the bone: with a porosity, density and constants in `parameters` \
+                  are those of the bone between the pores",
+    };
+    /// The key of the sublayers.
+    pub const SUBLAYERS: Key = Key {
+        name: "sublayers",
+        meaning: "sublayers from the skin's side to the marrow's, each with a thickness and a solid",
     };
 
-    /// Returns whether there are pores.
-    pub fn is_any(&self) -> bool {
-        self.mean_porosity().is_some()
+    /// Returns whether there are pores or sublayers.
+    pub fn is_given(&self) -> bool {
+        self.mean_porosity().is_some() || self.is_layered()
     }
 
-    /// Returns the mean porosity through the thickness; `None` without pores.
+    /// Returns whether there are sublayers of their own solids.
+    pub fn is_layered(&self) -> bool {
+        !self.sublayers.is_empty()
+    }
+
+    /// Returns whether density and constants of the point are those of the bone between pores.
+    pub fn has_pores(&self) -> bool {
+        let is_porous = |one: &MeanSublayer| matches!(one.solid, MeanSolid::Porous(_));
+        self.mean_porosity().is_some() || self.sublayers.iter().any(is_porous)
+    }
+
+    /// Returns the porosity, or the mean of its profile through the thickness; `None` without either.
     pub fn mean_porosity(&self) -> Option<f64> {
         self.porosity.or_else(|| self.profile.mean())
     }
@@ -150,17 +174,20 @@ impl Pores {
                 marrow: searched(Parameter::MarrowPorosity, self.profile.marrow),
                 ..self.profile.clone()
             },
-            model: self.model,
+            ..self.clone()
         }
     }
 
     /// Returns the mean solid at a point: density and mean elasticity of the bone. Where the porosity changes
-    /// through the thickness, it is that of the mean porosity.
+    /// through the thickness, it is that of the mean porosity; of sublayers it is the mean by thickness.
     ///
     /// # Errors
     /// If the mean model of the point is not admissible, or has no stiffness with these pores.
     pub fn mean_solid(&self, point: &Point) -> Result<Bone, NoPorousBone> {
         let matrix = point.mean_model();
+        if self.is_layered() {
+            return sublayers::mean(&self.sublayers, (&matrix, &self.model));
+        }
         match self.at(point).mean_porosity() {
             Some(porosity) => self.model.bone(&matrix, porosity),
             None => Ok(matrix.bone()?),
@@ -171,10 +198,10 @@ impl Pores {
     /// difference quotients.
     ///
     /// # Errors
-    /// Same as [`Pores::mean_solid`].
+    /// Same as [`BoneStructure::mean_solid`].
     pub fn bulk_velocity(&self, point: &Point) -> Result<BulkVelocity, NoPorousBone> {
         let of_matrix = bulk_velocity(point)?;
-        if !self.at(point).is_any() {
+        if !self.at(point).is_given() {
             return Ok(of_matrix);
         }
         let mut gradient = [0.0; PARAMETERS];
@@ -188,11 +215,11 @@ impl Pores {
         Ok(BulkVelocity { logarithm: self.bulk_logarithm(point)?, gradient })
     }
 
-    /// Returns the derivative of [`Pores::bulk_logarithm`] with respect to a parameter, as a difference
+    /// Returns the derivative of [`BoneStructure::bulk_logarithm`] with respect to a parameter, as a difference
     /// quotient.
     ///
     /// # Errors
-    /// Same as [`Pores::mean_solid`].
+    /// Same as [`BoneStructure::mean_solid`].
     pub fn bulk_slope(&self, point: &Point, parameter: Parameter) -> Result<f64, NoPorousBone> {
         let place = parameter as usize;
         let step = STEP * point.0[place].abs().max(STEP);
@@ -207,9 +234,9 @@ impl Pores {
     /// Returns ln √(c1111/ρ) of the mean solid at a point, the velocity in m/s.
     ///
     /// # Errors
-    /// Same as [`Pores::mean_solid`].
+    /// Same as [`BoneStructure::mean_solid`].
     pub fn bulk_logarithm(&self, point: &Point) -> Result<f64, NoPorousBone> {
-        if !self.at(point).is_any() {
+        if !self.at(point).is_given() {
             return Ok(bulk_velocity(point)?.logarithm);
         }
         let Bone { density, elasticity } = self.mean_solid(point)?;
@@ -227,6 +254,10 @@ impl Pores {
         thickness: f64,
         realize: impl Fn(Bone) -> Result<Bone, E>,
     ) -> Result<CaseBone, E> {
+        if self.is_layered() {
+            let of = (matrix, &self.model);
+            return layered(&sublayers::realized(&self.sublayers, of, thickness, realize)?);
+        }
         let solid = |porosity| realize(self.model.bone(matrix, porosity)?);
         if let Some(porosity) = self.porosity {
             return solid(porosity).map(CaseBone::Homogeneous);
@@ -237,13 +268,16 @@ impl Pores {
         };
         let each = thickness / porosities.len() as f64;
         let sublayer = |&porosity| Ok(Sublayer { thickness: each, solid: solid(porosity)? });
-        let sublayers = porosities.iter().map(sublayer).collect::<Result<Vec<_>, E>>()?;
-        let layered = Sublayers::new(&sublayers).map(CaseBone::Layered);
-        layered.ok_or_else(|| NoPorousBone::Sublayers { count: sublayers.len() }.into())
+        layered(&porosities.iter().map(sublayer).collect::<Result<Vec<_>, E>>()?)
     }
 }
 
-impl Section for Pores {
+fn layered<E: From<NoPorousBone>>(sublayers: &[Sublayer]) -> Result<CaseBone, E> {
+    let bone = Sublayers::new(sublayers).map(CaseBone::Layered);
+    bone.ok_or_else(|| NoPorousBone::Sublayers { count: sublayers.len() }.into())
+}
+
+impl Section for BoneStructure {
     fn declare(&mut self, fields: &mut dyn Fields) {
         let number = Number::plausible(porosity::ACCEPTED, &plausible::POROSITY);
         let meaning = "part of the volume that pores take, the same through the thickness";
@@ -253,6 +287,7 @@ impl Section for Pores {
                        file it is written as `porosity = { surface = …, marrow = … }`";
         fields.table(Key { name: PROFILE, meaning }, &mut |fields| self.profile.declare(fields));
         fields.table(PorosityModel::KEY, &mut |fields| self.model.declare(fields));
+        fields.custom_table(Self::SUBLAYERS);
     }
 }
 
