@@ -120,6 +120,43 @@ fn sublayers_are_simulated_and_checked_by_both_methods() {
 }
 
 #[test]
+fn a_job_of_sublayers_has_the_bones_of_their_stack() {
+    let scratch = Scratch::new();
+    let write = |name, bone: &str| {
+        let settings =
+            "[parameters]\ndispersion = { fixed = 0.1 }\n[monte_carlo]\nrealizations = 6\n";
+        scratch.write(name, &format!("{bone}\n{settings}"))
+    };
+    let digest = |file: &Path| run(&["propagate", text(file), "--json"]).json()["digest"].clone();
+    let porous =
+        |thickness: &str| format!("[[bone.sublayers]]\nthickness = {thickness}\nporosity = 0.1\n");
+    let stack = write("equal.toml", &format!("{}{}", porous("1.5e-3"), porous("2.5e-3")));
+    assert_eq!(
+        digest(&stack),
+        digest(&write("plate.toml", "[bone]\nporosity = 0.1")),
+        "to the bit"
+    );
+    // The thickness of all together is random, and one has a tensor of its own.
+    let random = "[random.bone_thickness]\nstandard_deviation = 0.2e-3\n[[bone.sublayers]]\nthickness = 1e-3\n";
+    let material = "material = \"human-femur-ashman-1984\"\n";
+    let file = write("random.toml", &format!("{random}{material}{}", porous("2.5e-3")));
+    let coordinator = Coordinator::start(&scratch.path("store"));
+    let _worker = coordinator.worker(2);
+    let remote = coordinator.client(&["propagate", text(&file), "--json"]).json();
+    assert_eq!(remote["failures"], serde_json::json!({}));
+    assert_eq!(remote["digest"], digest(&file));
+    // A realization is a case, whose velocity is that of the job.
+    let out = scratch.path("out");
+    run(&["propagate", text(&file), "--out", text(&out)]).succeeded();
+    let rows = fs::read_to_string(out.join("realizations.csv")).unwrap();
+    let row = rows.lines().nth(3).unwrap().split(',').nth(1).unwrap().parse::<f64>().unwrap();
+    let drawn =
+        scratch.write("drawn.toml", run(&["draw", text(&file), "--index", "2"]).succeeded());
+    let simulated = run(&["simulate", text(&drawn), "--json"]).json();
+    assert_eq!(simulated["velocity"].as_f64(), Some(row));
+}
+
+#[test]
 fn a_check_of_a_case_with_attenuation_refines_only() {
     let scratch = Scratch::new();
     let attenuation = "[layers]\nbone = { attenuation = { quality_factor = 15 } }\n";

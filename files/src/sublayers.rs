@@ -45,7 +45,9 @@ pub(crate) fn is_any_porous(table: &Table<'_>) -> bool {
 
 /// Refuses what a bone of sublayers leaves out.
 fn refuse_keys_of_one_solid(reader: &mut Reader, root: &Table<'_>, table: &Table<'_>) {
-    for key in solid::KEYS.into_iter().filter(|key| table.has(key)) {
+    let is_known = |key: &&str| reader.violations.has_at_or_below(&table.path(key));
+    let beside = solid::KEYS.into_iter().filter(|key| table.has(key) && !is_known(key));
+    for key in beside.collect::<Vec<_>>() {
         let message = format!(
             "is given together with {KEY}, each of which has a solid of its own; leave one of \
              them out"

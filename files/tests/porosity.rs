@@ -4,14 +4,18 @@
 
 mod support;
 
+use std::path::Path;
+
 use osteon_common::bone::CaseBone;
 use osteon_common::case::Case;
 use osteon_common::elasticity::EngineeringConstants;
+use osteon_common::job::JobKind;
 use osteon_common::porosity::{
     BoneMatrix, CasePorosityModel, Homogenisation, PoreFluid, PorosityModel,
 };
-use osteon_files::case_file;
+use osteon_common::realization::mean_bone;
 use osteon_files::document::Format;
+use osteon_files::{case_file, job_file};
 
 use support::pin;
 
@@ -100,6 +104,28 @@ fn sublayers_have_porosities_by_the_model_of_the_bone() {
     assert!(refused.contains("bone.sublayers[1].porosity: is 0.6"), "{refused}");
     let refused = case(&text("porosity = 0.1")).unwrap_err();
     assert!(refused.contains("bone.porosity: is given together with sublayers"), "{refused}");
+}
+
+#[test]
+fn a_job_has_sublayers_of_any_solids() {
+    let job = |text: &str| {
+        let kind = JobKind::Propagation;
+        job_file::parse(text, Format::Toml, Path::new(""), kind).map_err(|error| error.to_string())
+    };
+    let dispersion = "[parameters]\ndispersion = { fixed = 0.1 }";
+    let named = "[[bone.sublayers]]\nthickness = 1e-3\nmaterial = \"human-femur-ashman-1984\"";
+    let porous = "[[bone.sublayers]]\nthickness = 2e-3\nporosity = 0.15";
+    let read = job(&format!("{named}\n{porous}\n{dispersion}")).unwrap();
+    assert_eq!(read.setup.layers.bone_thickness, 1e-3 + 2e-3);
+    let bone = mean_bone(&read.start(), &read.setup).unwrap();
+    assert_eq!(bone, case(&format!("{named}\n{porous}")).unwrap().bone);
+    assert_eq!(job(&job_file::to_toml(&read)).unwrap(), read);
+    // Where none is porous, the parameters have no meaning but the dispersion.
+    let read = job(&format!("{named}\n{dispersion}")).unwrap();
+    assert_eq!(job(&job_file::to_toml(&read)).unwrap(), read);
+    let refused = job(&format!("{named}\n{dispersion}\ndensity = {{ fixed = 1800.0 }}"));
+    let expected = "parameters.density: has no effect, as each of bone.sublayers";
+    assert!(refused.as_ref().unwrap_err().contains(expected), "{refused:?}");
 }
 
 /// As with a material, nothing but the values goes on.

@@ -59,10 +59,11 @@ fn sublayers(structure: &BoneStructure, violations: &mut Violations) {
         let message = format!("has {count} elements; it must be a list of 1 to {most} tables");
         return violations.add(FIELD, message);
     }
-    if structure.mean_porosity().is_some() {
+    let porosity_key = SetupQuantity::Porosity.mean_key();
+    if structure.mean_porosity().is_some() && !known_wrong(porosity_key, violations) {
         let message = "is given together with sublayers, each of which has a solid of its own; leave one of \
                        them out";
-        violations.add(SetupQuantity::Porosity.mean_key(), message);
+        violations.add(porosity_key, message);
     }
     for (index, MeanSublayer { thickness, solid }) in structure.sublayers.iter().enumerate() {
         let field = |key: &str| format!("{}.{key}", element_path(FIELD, index));
@@ -90,7 +91,7 @@ pub(super) fn parameters_of_sublayers(
     let unused = Point::of_matrix(&BoneMatrix::default(), 0.0);
     for parameter in Parameter::OF_BONE.into_iter().filter(|one| *one != Parameter::Dispersion) {
         let field = format!("parameters.{}", parameter.name());
-        let is_default = *specification.range(parameter) == Range::Fixed(unused.get(parameter));
+        let is_default = specification.range(parameter) == Range::Fixed(unused.get(parameter));
         if !is_default && !violations.has_at_or_below(&field) {
             let message =
                 "has no effect, as each of bone.sublayers has a solid of its own; leave it out";

@@ -3,7 +3,7 @@
 use osteon_common::job::{JobKind, Range};
 use osteon_common::parameters::Parameter;
 
-use super::{check, edited};
+use super::{BONE, check, edited};
 
 /// The first range of `files/job.toml`.
 const FIRST: &str = "[parameters.density]\n";
@@ -34,7 +34,7 @@ fn setup_parameters() {
 }
 
 #[test]
-fn structure() {
+fn pores() {
     let bone = |keys: &str| (FIRST, format!("[bone]\n{keys}\n\n{FIRST}"));
     let edits = [
         bone("porosity = 0.0"),
@@ -133,4 +133,34 @@ fn a_quantity_of_the_setup_starts_at_its_value_there() {
     assert_eq!(job.range(Parameter::BoneThickness), expected);
     assert_eq!(job.range(Parameter::CouplingSoundSpeed), Range::AS_IN_SETUP);
     assert_eq!(job.parameters_given().count(), 8);
+}
+
+#[test]
+fn sublayers() {
+    const SOLID: &str = "density = 1850.0\nlongitudinal_young_modulus = 20e9\nlongitudinal_poisson_ratio = \
+                         0.38\nlongitudinal_shear_modulus = 5e9\ntransverse_young_modulus = \
+                         10e9\ntransverse_poisson_ratio = 0.44";
+    const LAST: &str = "marrow   = { thickness = 12e-3, density = 950.0, sound_speed = 1450.0 }";
+    let layers = format!("{BONE}\n{LAST}\n");
+    let attenuated = layers.replace("thickness = 3e-3, attenuation", "attenuation");
+    let stack = |before: &str, keys: &str| {
+        let upper = "[[bone.sublayers]]\nthickness = 2e-3\nporosity = 0.05";
+        format!("{attenuated}\n{before}\n{upper}\n[[bone.sublayers]]\n{keys}\n")
+    };
+    let edits = [
+        stack("", "porosity = 0.1"),
+        stack("", "thickness = 1\nporosity = 0.1"),
+        stack("", "thickness = 1e-3"),
+        stack("", "thickness = 1e-3\nporosity = 0.6"),
+        stack("", "thickness = 1e-3\nporosity = 0.1\ndensity = 1800.0"),
+        stack("", &format!("thickness = 1e-3\n{}", SOLID.replace("1850.0", "0.0"))),
+        stack("", "thickness = 1e-3\ndensity = 1800.0\nmandel = [[1.0]]"),
+        stack("[bone]\nporosity = 0.1", "thickness = 1e-3\nporosity = 0.1"),
+        stack("[bone]\ndensity = 1800.0", "thickness = 1e-3\nporosity = 0.1"),
+        stack("[parameters.porosity]\nbounds = [0.05, 0.2]", "thickness = 1e-3\nporosity = 0.1"),
+        // The thickness of the bone is given, and nothing is left of which the parameters could be.
+        format!("{layers}\n[[bone.sublayers]]\nthickness = 4e-3\n{SOLID}\n"),
+    ];
+    let edits: Vec<(&str, &str)> = edits.iter().map(|to| (layers.as_str(), to.as_str())).collect();
+    check("rejected_job_sublayers", JobKind::Identification, &edits);
 }

@@ -6,7 +6,7 @@
 
 mod comments;
 mod names;
-mod bone_structure;
+mod structure;
 
 use std::collections::BTreeSet;
 use std::fmt;

@@ -181,7 +181,8 @@ fn sublayers() -> impl Strategy<Value = BoneStructure> {
     });
     let solid = prop_oneof![porous(), given];
     let lower = proptest::collection::vec((thickness(), solid), 0..MeanSublayer::COUNT_MAX);
-    ((thickness(), porous()), lower).prop_map(|(first, lower)| {
+    // Random thicknesses are drawn for a bone of 4 mm at least.
+    ((4e-3..5e-3, porous()), lower).prop_map(|(first, lower)| {
         let sublayer = |(thickness, solid)| MeanSublayer { thickness, solid };
         let sublayers = [first].into_iter().chain(lower).map(sublayer).collect();
         BoneStructure { sublayers, ..BoneStructure::default() }
