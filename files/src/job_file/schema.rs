@@ -179,7 +179,7 @@ fn sublayers() -> Json {
         let value = number(None, parameter.row().accepted);
         properties[parameter.name()] = said_to_be(value, &meaning(parameter));
     }
-    let mut element = object(properties);
+    let mut element = said_to_be(object(properties), "one of sublayers");
     element["required"] = json!(["thickness"]);
     json!({ "type": "array", "items": element, "minItems": 1, "maxItems": MeanSublayer::COUNT_MAX })
 }
