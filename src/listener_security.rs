@@ -32,6 +32,7 @@ impl ListenerSecurity {
     ) -> Result<Self, CommandFailure> {
         let CoordinatorArguments { tls_ca, tls_cert, tls_key, .. } = arguments;
         let tokens = tokens(arguments)?;
+        // All three or none: the parser sees to that.
         let (Some(ca), Some(certificate), Some(key)) = (tls_ca, tls_cert, tls_key) else {
             return match tokens {
                 None => Ok(Self::None),
@@ -52,14 +53,14 @@ impl ListenerSecurity {
         let tls = Tls::load(&files).map_err(CommandFailure::bad_input)?;
         let tokens = tokens.ok_or_else(|| {
             CommandFailure::bad_input(anyhow!(
-                "with TLS, --tokens FILE is required, because every client needs a token; \
+                "with TLS, --tokens FILE or --token-file FILE is required, because every client needs a token; \
                  `osteon token` makes one"
             ))
         })?;
         Ok(Self::Tls(tls, tokens))
     }
 
-    /// The first of the files that is a pipe, if one is: it cannot be read again.
+    /// The first of the files that is a pipe, if one is: a reload cannot read it again.
     pub(crate) fn first_pipe(arguments: &CoordinatorArguments) -> Option<&Path> {
         let CoordinatorArguments { tls_ca, tls_cert, tls_key, tokens, token_file, .. } = arguments;
         let files = [tls_ca, tls_cert, tls_key, tokens, token_file].into_iter().flatten();
@@ -80,6 +81,7 @@ impl ListenerSecurity {
             (Self::Tls(tls, tokens), ListenAddress::Tcp(address)) => {
                 Listener::bind_tls(*address, tls, tokens).await
             }
+            // TLS on a Unix socket was refused above.
             (Self::Tokens(tokens) | Self::Tls(_, tokens), _) => {
                 Ok(Listener::bind(address, insecure).await?.with_tokens(tokens))
             }
@@ -88,6 +90,7 @@ impl ListenerSecurity {
     }
 }
 
+/// Returns the tokens of the list, and that of `--token-file`, which is an administrator's; `None` without either.
 fn tokens(arguments: &CoordinatorArguments) -> Result<Option<Tokens>, CommandFailure> {
     let CoordinatorArguments { tokens, token_file, .. } = arguments;
     let listed =

@@ -69,7 +69,7 @@ impl ProcessContext {
     /// When neither names one.
     pub(crate) fn remote(&self, client: ClientArguments) -> Result<Remote, CommandFailure> {
         let from_environment = client.coordinator.is_none();
-        let endpoint = self.environment.needed(client.coordinator)?;
+        let endpoint = self.environment.required_coordinator(client.coordinator)?;
         let (files, unused) = self.environment.files(client.credentials.into(), &endpoint);
         Ok(Remote { endpoint, files, from_environment, unused })
     }

@@ -48,7 +48,7 @@ impl Run {
     /// Resolves the arguments.
     ///
     /// # Errors
-    /// When arguments and environment do not say where.
+    /// When arguments and environment do not say where the job is computed.
     pub(crate) fn resolve(
         kind: JobKind,
         arguments: RunArguments,
@@ -56,7 +56,7 @@ impl Run {
     ) -> Result<Self, CommandFailure> {
         let RunArguments { job, threads, coordinator, credentials, out, report, .. } = arguments;
         let page = arguments.page.address();
-        // A page of its own is one of a run on this machine.
+        // A run with a page is computed on this machine.
         let workers = arguments.workers.or(page.map(|_| WORKERS_DEFAULT));
         Ok(Self {
             kind,

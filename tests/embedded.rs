@@ -430,7 +430,7 @@ fn too_few_open_files_are_named_at_once() {
         let (_, told) = refused.stderr.split_once("this process may have ").unwrap();
         let (found, told) = told.split_once(" open files and needs ").unwrap();
         assert_eq!(found, most.to_string());
-        needed = told.split_once(": raise the limit with `ulimit -n ").unwrap().0.parse().ok();
+        needed = told.split_once(": raise the hard limit (`ulimit -n ").unwrap().0.parse().ok();
         assert!(!refused.stderr.contains("trying again"), "{most}: {refused:?}");
         assert!(!out.exists(), "{most}");
     }

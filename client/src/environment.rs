@@ -97,8 +97,11 @@ impl Environment {
     /// Returns the coordinator of a command that requires one.
     ///
     /// # Errors
-    /// If neither the option nor the environment names one.
-    pub fn needed(&self, option: Option<Endpoint>) -> Result<Endpoint, EnvironmentError> {
+    /// If neither the option nor the environment names one, or if what the environment names is no address.
+    pub fn required_coordinator(
+        &self,
+        option: Option<Endpoint>,
+    ) -> Result<Endpoint, EnvironmentError> {
         match option {
             Some(endpoint) => Ok(endpoint),
             None => self.coordinator()?.ok_or(EnvironmentError::NoCoordinator),
@@ -219,7 +222,9 @@ mod tests {
         let resolved = |option: Option<&str>, variable: Option<&str>| {
             let variables: Vec<_> = variable.iter().map(|value| (COORDINATOR, *value)).collect();
             let option = option.map(|url| url.parse().unwrap());
-            environment(&variables).needed(option).map(|endpoint| endpoint.to_string())
+            environment(&variables)
+                .required_coordinator(option)
+                .map(|endpoint| endpoint.to_string())
         };
         assert_eq!(resolved(Some("unix:a"), Some("unix:b")).unwrap(), "unix:a");
         assert_eq!(resolved(Some("unix:a"), Some("")).unwrap(), "unix:a");

@@ -43,9 +43,8 @@ pub struct MonteCarlo {
     pub seed: u64,
     /// Method of drawing the germs.
     pub sampling: Sampling,
-    /// Number of independent scrambles of the Sobol' points, among which the realizations are
-    /// divided evenly: 1 to [`crate::limits::SCRAMBLES_MAX`], a divisor of their number; 1 for
-    /// independent germs.
+    /// Number of independent scrambles of the Sobol' points, 1 to
+    /// [`crate::limits::SCRAMBLES_MAX`]. It divides `realizations`, and is 1 with [`Sampling::MonteCarlo`].
     pub scrambles: u64,
     /// Whether the moments are corrected by the control variate √(c1111/ρ), whose moments under the
     /// law are known.

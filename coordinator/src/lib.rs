@@ -2,8 +2,8 @@
 //!
 //! The coordinator consists of a pure state machine ([`core`]) and an asynchronous shell around it
 //! ([`service`]) that only moves bytes. [`access`] decides who may call what; [`store`] holds
-//! everything that outlives the process; `metrics` says what is exported for monitoring, and [`live`] shows
-//! it to people. An [`osteon_search::Search`] decides which points a job evaluates and does not depend on
+//! everything that outlives the process; `metrics` is what is exported for monitoring, and [`live`] the
+//! page that shows jobs to people. An [`osteon_search::Search`] decides which points a job evaluates and does not depend on
 //! workers. This crate never links the solver: only workers solve.
 
 #![forbid(unsafe_code)]

@@ -42,7 +42,7 @@ pub struct Material {
 
 impl Material {
     /// The parameters that a material has.
-    pub const HAS: [Parameter; 6] = {
+    pub const PARAMETERS: [Parameter; 6] = {
         let [of_material @ .., _dispersion] = Parameter::OF_BONE;
         of_material
     };

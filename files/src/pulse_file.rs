@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::user_file;
 
-/// Limit of a file's length: two numbers of 64 bytes for each sample that a pulse may have.
+/// Limit of a file's length: two numbers of at most 64 characters for each sample that a pulse may have.
 const BYTES_MAX: u64 = 128 * SAMPLES.max;
 /// Largest difference of a time from the one that equal steps give, relative to the step.
 const UNEVEN_MAX: f64 = 0.01;
@@ -28,11 +28,14 @@ pub(crate) enum PulseFileError {
     Array { reason: String },
     #[error("has {count} rows; at least {} are needed", SAMPLES.min)]
     Short { count: usize },
-    #[error("has times at unequal steps, first at row {row}")]
+    #[error(
+        "has times that do not rise by equal steps from the first to the last: row {row} is off"
+    )]
     Uneven { row: usize },
 }
 
 /// Reads the samples in the file at `path`; one that ends in `.npy` is an array, any other is text.
+/// The inner error: the file was read, but its samples are no pulse.
 pub(crate) fn read(path: &Path) -> Result<Result<PulseSamples, NoPulse>, PulseFileError> {
     let bytes = user_file::read(path, BYTES_MAX)?.ok_or(PulseFileError::Long)?;
     let is_array = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npy"));
@@ -174,7 +177,10 @@ mod tests {
                 format!("{plain}2e-6,oops\n"),
                 "has a line 41 that is not two numbers, time in s and value",
             ),
-            (format!("{plain}3e-6,0.0\n"), "has times at unequal steps, first at row 2"),
+            (
+                format!("{plain}3e-6,0.0\n"),
+                "has times that do not rise by equal steps from the first to the last: row 2 is off",
+            ),
             (written(",", &rows()[..7]), "has 7 rows; at least 8 are needed"),
             (
                 format!("{plain}1,2,3\n"),

@@ -1,7 +1,7 @@
 //! The server of all listeners that speak HTTP/1.1: the metrics and the live page of a coordinator, and
-//! UM-Bridge. What they answer is a router of theirs, and how many connections they admit is theirs to
-//! decide; that no client holds a connection by silence, by a long header, or by not reading, and that a
-//! browser's other pages are told apart, is the same for all.
+//! UM-Bridge. Each brings its router and its limit of connections. Common to all: clients are cut off that
+//! hold a connection by silence, by a long header, or by not reading, and requests are recognized that
+//! other sites' pages make a browser send.
 
 #![forbid(unsafe_code)]
 

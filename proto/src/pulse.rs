@@ -24,8 +24,8 @@ pub(crate) fn to_message(form: &PulseForm) -> v1::Pulse {
     }
 }
 
-/// Returns the form of a message. `None` after recording an unknown shape, a field that the shape lacks or
-/// does not have, or samples that are no pulse.
+/// Returns the form of a message. `None` after recording an unknown shape, a field that is missing or
+/// belongs to another shape, or samples that are no pulse.
 pub(crate) fn from_message(message: &v1::Pulse, violations: &mut Violations) -> Option<PulseForm> {
     let v1::Pulse { shape, cycles, step, samples } = message;
     let Ok(shape) = PulseShape::try_from(*shape) else {
@@ -42,8 +42,8 @@ pub(crate) fn from_message(message: &v1::Pulse, violations: &mut Violations) -> 
     for (field, is_given, is_needed, of) in given {
         if is_given != is_needed {
             let (field, name) = (format!("{FIELD}.{field}"), of.as_str_name());
-            let lack = if is_given { "belongs to" } else { "is missing; it is required with" };
-            violations.add(field, format!("{lack} the shape {name}"));
+            let problem = if is_given { "belongs to" } else { "is missing; it is required with" };
+            violations.add(field, format!("{problem} the shape {name}"));
             complete = false;
         }
     }
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_that_a_shape_lacks_or_does_not_have_are_refused() {
+    fn fields_that_are_missing_or_of_another_shape_are_refused() {
         let pulse = |shape: PulseShape| v1::Pulse { shape: shape.into(), ..v1::Pulse::default() };
         for (message, expected) in [
             (pulse(PulseShape::Unspecified), "Paper"),

@@ -11,7 +11,7 @@ use crate::resolved::{OutputFormat, format};
 /// Prepares the examination.
 ///
 /// # Errors
-/// When the environment holds something that cannot be meant.
+/// When an environment variable has an invalid value.
 pub(super) fn prepare(
     arguments: DoctorArguments,
     context: &ProcessContext,

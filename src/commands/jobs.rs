@@ -44,35 +44,41 @@ pub(super) fn prepare(
     Ok(match command {
         JobCommand::Submit(arguments) => {
             let coordinator = remote(arguments.client.clone())?;
-            let left = "the job may have been accepted (see `osteon job list`)";
-            PreparedCommand::interruptible(left, submit(arguments, coordinator))
+            let if_interrupted = "the job may have been accepted (see `osteon job list`)";
+            PreparedCommand::interruptible(if_interrupted, submit(arguments, coordinator))
         }
         JobCommand::List(JobListArguments { client, json }) => {
             PreparedCommand::harmless(list(remote(client)?, format(json)))
         }
         JobCommand::Watch(WatchArguments { job: JobArguments { job, client }, json }) => {
-            let left = "the job continues (see `osteon job list`, `osteon job cancel`)";
-            PreparedCommand::interruptible(left, watch(job, remote(client)?, format(json)))
+            let if_interrupted = "the job continues (see `osteon job list`, `osteon job cancel`)";
+            PreparedCommand::interruptible(
+                if_interrupted,
+                watch(job, remote(client)?, format(json)),
+            )
         }
         JobCommand::Explain(ExplainArguments { job, client, json }) => {
             PreparedCommand::harmless(explain(job, remote(client)?, format(json)))
         }
         JobCommand::Cancel(JobArguments { job, client }) => {
-            let left = "the job may have been cancelled (see `osteon job list`)";
-            PreparedCommand::interruptible(left, cancel(job, remote(client)?))
+            let if_interrupted = "the job may have been cancelled (see `osteon job list`)";
+            PreparedCommand::interruptible(if_interrupted, cancel(job, remote(client)?))
         }
         JobCommand::Fetch(FetchArguments { job, client, out }) => {
-            let left = "run the same command again to fetch the results";
-            PreparedCommand::interruptible(left, fetch(job, remote(client)?, out))
+            let if_interrupted = "run the same command again to fetch the results";
+            PreparedCommand::interruptible(if_interrupted, fetch(job, remote(client)?, out))
         }
         JobCommand::Recheck(WatchArguments { job: JobArguments { job, client }, json }) => {
-            let left = "the job may be computed again (see `osteon job list`)";
-            PreparedCommand::interruptible(left, recheck(job, remote(client)?, format(json)))
+            let if_interrupted = "the job may be computed again (see `osteon job list`)";
+            PreparedCommand::interruptible(
+                if_interrupted,
+                recheck(job, remote(client)?, format(json)),
+            )
         }
         JobCommand::Prune(arguments) => {
             let coordinator = remote(arguments.client.clone())?;
-            let left = "jobs may have been deleted (see `osteon job list`)";
-            PreparedCommand::interruptible(left, prune(arguments, coordinator))
+            let if_interrupted = "jobs may have been deleted (see `osteon job list`)";
+            PreparedCommand::interruptible(if_interrupted, prune(arguments, coordinator))
         }
     })
 }
@@ -187,11 +193,11 @@ async fn fetch(job: String, coordinator: Remote, out: PathBuf) -> Ended {
 }
 
 /// Returns whether the fetched result replaces the one stored in `out`: if only what is known of its
-/// integrity differs, if it is the stored result computed again without a banned host, or if the stored run
-/// was cancelled or failed.
+/// integrity differs, if it is the stored result computed again without a banned host, if the stored run was
+/// cancelled, or if that failed and the fetched one was not cancelled.
 ///
 /// # Errors
-/// If `out` has another result of a completed run, which is never replaced.
+/// If `out` has another result that is not replaced.
 fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, CommandFailure> {
     let specification = &fetched.specification;
     let new = &fetched.result;
@@ -204,8 +210,8 @@ fn replaces(fetched: &Fetched, stored: &ResultFile, out: &Path) -> Result<bool, 
     if earlier == Some(stored.digest()) {
         return Ok(true);
     }
-    let failed = !result_status::is_complete(specification, stored);
-    if failed && !result_status::is_cancelled(new) || result_status::is_cancelled(stored) {
+    let incomplete = !result_status::is_complete(specification, stored);
+    if incomplete && !result_status::is_cancelled(new) || result_status::is_cancelled(stored) {
         return Ok(true);
     }
     let shown = |result: &ResultFile| {

@@ -47,7 +47,7 @@ fn list(all: &[&(&str, Material)]) -> String {
 
 fn details((name, material): &(&str, Material)) -> String {
     let doi = material.doi.as_ref().map(|doi| format!("https://doi.org/{doi}\n"));
-    let values = Material::HAS.into_iter().filter_map(|parameter| {
+    let values = Material::PARAMETERS.into_iter().filter_map(|parameter| {
         let value = material.value(parameter)?;
         let unit = match parameter.unit() {
             "" => String::new(),
@@ -76,7 +76,7 @@ fn object((name, material): &(&str, Material)) -> Value {
         "checked": material.checked,
         "density_origin": material.density_origin,
     });
-    for parameter in Material::HAS {
+    for parameter in Material::PARAMETERS {
         object[parameter.name()] = material.value(parameter).into();
     }
     object

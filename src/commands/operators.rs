@@ -43,12 +43,16 @@ pub(super) fn prepare_for_worker(
             PreparedCommand::harmless(workers(remote(client)?, format(json)))
         }
         WorkerCommand::Drain(DrainArguments { worker, client, json }) => {
-            let left = "the worker may have been told to drain (see `osteon worker list`)";
-            PreparedCommand::interruptible(left, drain(worker, remote(client)?, format(json)))
+            let if_interrupted =
+                "the worker may have been told to drain (see `osteon worker list`)";
+            PreparedCommand::interruptible(
+                if_interrupted,
+                drain(worker, remote(client)?, format(json)),
+            )
         }
         WorkerCommand::Unban(UnbanArguments { host, client }) => {
-            let left = "the ban may have been lifted (see `osteon worker list`)";
-            PreparedCommand::interruptible(left, unban(host, remote(client)?))
+            let if_interrupted = "the ban may have been lifted (see `osteon worker list`)";
+            PreparedCommand::interruptible(if_interrupted, unban(host, remote(client)?))
         }
         WorkerCommand::Wing(command) => command.prepare(context)?,
     })

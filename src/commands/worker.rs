@@ -25,7 +25,7 @@ pub(super) fn prepare(
 ) -> Result<PreparedCommand, CommandFailure> {
     let environment = &context.environment;
     let isa = ProcessContext::isa()?;
-    let endpoint = environment.needed(arguments.coordinator)?;
+    let endpoint = environment.required_coordinator(arguments.coordinator)?;
     let (files, unused) = environment.files(arguments.credentials.into(), &endpoint);
     let config = WorkerConfig {
         spans: None,

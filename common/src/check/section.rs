@@ -11,7 +11,7 @@ use crate::violations::Violations;
 use super::value::{elements, known_wrong, number, quantity, whole};
 
 /// Records each key of `section`, which is the table `name` of a file, whose value is not accepted
-/// or in another unit. Keys that are not meaningful must have the values that they have in
+/// or looks as if it were in another unit. Keys that are not meaningful must have the values that they have in
 /// `default`.
 pub(crate) fn section(
     name: &str,

@@ -7,7 +7,7 @@ use osteon_proto::identity::{self, NoRandomness};
 use crate::core::ids::{BatchId, JobId, LeaseId};
 use crate::core::indices::Indices;
 
-/// Key that decides which batches are audited. It is a secret of a running coordinator, since a
+/// Key that decides which realizations are audited. It is a secret of a running coordinator, since a
 /// worker that knew it could return wrong answers where they are not checked. It changes no result.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
 pub struct AuditKey([u8; 32]);
@@ -30,7 +30,7 @@ impl fmt::Debug for AuditKey {
 
 /// Returns whether the saved results of `job` that begin at index `first` of evaluation `number` are
 /// audited: a function of these and the key.
-pub(crate) fn is_chosen(
+pub(crate) fn is_saved_part_chosen(
     key: &AuditKey,
     job: JobId,
     number: u64,
@@ -54,14 +54,14 @@ impl NextAudit {
     /// Returns the first audit of a worker with `slots` slots.
     pub(crate) fn first((key, fraction): (&AuditKey, f64), lease: LeaseId, slots: u32) -> Self {
         let u = uniform(key, [lease.0, 0, 2]);
-        Self { left: distance(fraction, slots.into(), u), length: slots.into() }
+        Self { left: interval(fraction, slots.into(), u), length: slots.into() }
     }
 }
 
 /// Returns which of the realizations `answered` by a worker are audited, `None` if none are due, and the audit
 /// after this one. Few realizations, but at least `least`, are audited at a time and often, so that a machine that
-/// breaks is found soon. When the next audit is due is drawn, so that no worker can foresee it; the interval is at
-/// most twice the mean.
+/// breaks is found soon. The time of the next audit is random, so that no worker can foresee it; the interval is
+/// at most twice the mean.
 pub(crate) fn choose(
     (key, fraction): (&AuditKey, f64),
     (batch, least): (BatchId, u64),
@@ -81,16 +81,17 @@ pub(crate) fn choose(
     if fraction >= 1.0 {
         return (Some(audited), NextAudit { left: 0.0, length });
     }
-    // The realizations of this answer after the audit was due, and those that were audited beyond the plan, change
-    // when the next audit is due, so that the fraction is kept.
+    // The audit was due -`left` realizations ago. These, and those audited beyond the plan, move the next one, so that
+    // the fraction is kept.
     let unplanned = (length as f64 - due.length as f64) / fraction;
     let next = share.max(least).min(answered.count);
-    let left = left + unplanned + distance(fraction, next, draw(1));
+    let left = left + unplanned + interval(fraction, next, draw(1));
     (Some(audited), NextAudit { left, length: next })
 }
 
-/// Returns the number of realizations of which `audited` are the fraction, times 2 u.
-fn distance(fraction: f64, audited: u64, u: f64) -> f64 {
+/// Returns a random number of realizations to the next audit, whose mean is `audited` / `fraction`; `u` is uniform
+/// in [0, 1).
+fn interval(fraction: f64, audited: u64, u: f64) -> f64 {
     if fraction >= 1.0 { 0.0 } else { 2.0 * u * audited as f64 / fraction }
 }
 
@@ -101,7 +102,8 @@ pub(crate) fn choose_one(key: &AuditKey, attempt: u64, answered: Indices) -> Ind
     Indices { first, count: 1 }
 }
 
-/// Returns a uniform number in [0, 1): a function of these numbers and the key.
+/// Returns a uniform number in [0, 1): a function of the key and of these numbers, of which the last tells draws of
+/// different purposes apart.
 fn uniform(key: &AuditKey, of: [u64; 3]) -> f64 {
     let mut hasher = blake3::Hasher::new_keyed(&key.0);
     for part in of {
@@ -128,7 +130,8 @@ mod tests {
 
     /// Returns which of many batches are chosen.
     fn chosen_batches(key: &AuditKey, fraction: f64) -> Vec<u64> {
-        let is_audited = |i: &u64| is_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
+        let is_audited =
+            |i: &u64| is_saved_part_chosen(key, JobId(i % 7), i % 90, i * 16, fraction);
         (0..10_000).filter(is_audited).collect()
     }
 

@@ -2,9 +2,10 @@
 //! blame for the losses.
 //!
 //! Machines fail for more reasons than poison tasks: a bad node crashes whatever it is given, and a
-//! stopped coordinator loses all workers at once. So a realization is only blamed for workers that
-//! had answered something before, whose streams broke while they held nothing else and that did not
-//! come back, on different hosts if there are any.
+//! stopped coordinator loses all workers at once. So a realization is blamed for workers that had
+//! answered something before, whose streams broke while they held nothing else and that did not come
+//! back, on different hosts if there are any. After [`LOSSES_MAX`] losses of any kind it is blamed, too,
+//! so that retries end.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -20,7 +21,7 @@ pub(crate) enum Cause {
     /// Its stream broke: the process may have died.
     StreamBroke,
     /// It sent nothing until its lease expired.
-    Silence,
+    LeaseExpired,
     /// It is alive, but does not answer, or its answers cannot be used.
     Misbehaviour,
 }
@@ -47,7 +48,7 @@ impl LostWorker {
     }
 }
 
-/// Workers that were lost while they held one task and nothing else.
+/// Losses of workers that held one task and nothing else but perhaps their proof.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Crashes(Vec<LostWorker>);
 
@@ -104,14 +105,14 @@ impl Crashes {
         self.0.iter().map(|loss| loss.at).max()
     }
 
-    /// Returns whether one more loss is the last for which the task is tried.
+    /// Returns whether one more loss makes the task poison, whatever its kind.
     pub(crate) fn permit_only_one_more(&self) -> bool {
         self.0.len() + 1 >= LOSSES_MAX
     }
 
     /// Returns whether enough workers were lost that the task is poison. `untried` returns whether
-    /// there is a worker that may be expected to do better, on another host or attached since
-    /// before the first loss.
+    /// there is a worker that may be expected to do better: one on another host, or one that has outlived
+    /// all these losses.
     pub(crate) fn reach_limit(&self, untried: impl FnOnce() -> bool) -> bool {
         let credible = || self.0.iter().filter(|loss| loss.is_credible());
         let hosts: BTreeSet<&str> = credible().map(|loss| loss.worker.host()).collect();
@@ -167,7 +168,7 @@ mod tests {
         let little: [fn(usize, &mut LostWorker); 4] = [
             |_, loss| loss.has_answered = false,
             |_, loss| loss.owed_proof = true,
-            |_, loss| loss.cause = Cause::Silence,
+            |_, loss| loss.cause = Cause::LeaseExpired,
             |_, loss| loss.cause = Cause::Misbehaviour,
         ];
         for change in little {
@@ -190,7 +191,7 @@ mod tests {
             has_answered: true,
         };
         for (cause, left) in
-            [(Cause::StreamBroke, 0), (Cause::Silence, 0), (Cause::Misbehaviour, 1)]
+            [(Cause::StreamBroke, 0), (Cause::LeaseExpired, 0), (Cause::Misbehaviour, 1)]
         {
             let mut crashes = Crashes::default();
             crashes.add(&loss(cause));

@@ -15,7 +15,7 @@ impl Indices {
         self.first + self.count
     }
 
-    /// Takes at most `most` indices, at least one, from the front; none may be left.
+    /// Takes at most `most` indices, at least one, from the front; `self` may be empty afterwards.
     pub(crate) fn take(&mut self, most: u64) -> Self {
         let taken = Self { first: self.first, count: self.count.min(most.max(1)) };
         self.first += taken.count;

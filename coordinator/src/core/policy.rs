@@ -67,7 +67,7 @@ pub(crate) const MISSED_MAX: u32 = 3;
 pub(crate) const SILENT_MAX: Duration = Duration::from_secs(60);
 /// Batches with the same indices that are out at a time. As each may take twice as long as the one before, the last
 /// is sent after six minutes at the earliest.
-pub(crate) const DUPLICATES_MAX: usize = 8;
+pub(crate) const COPIES_MAX: usize = 8;
 /// A batch that has taken this many times its expected time is duplicated before anything is computed speculatively.
 pub(crate) const LATE_FACTOR: u32 = 2;
 /// Pause without work after the first batch that a worker on probation leaves unanswered; each further one doubles it.

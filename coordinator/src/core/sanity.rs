@@ -12,7 +12,7 @@ use crate::core::dispute::Dispute;
 use crate::core::evaluation::PendingEvaluation;
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::job::{Job, RequestName, Speculation, Stage};
-use crate::core::policy::{BATCHES_IN_FLIGHT_MAX, CANDIDATES_MAX, DUPLICATES_MAX, SETTLED_MAX};
+use crate::core::policy::{BATCHES_IN_FLIGHT_MAX, CANDIDATES_MAX, COPIES_MAX, SETTLED_MAX};
 use crate::core::state::{Banned, State};
 use crate::core::worker_name::WorkerName;
 
@@ -286,7 +286,7 @@ fn check_batches(state: &State) -> Result<(), Inconsistency> {
                     && other.worker != batch.worker
             })
         };
-        if !batch.duplicates.iter().all(matches) || batch.duplicates.len() >= DUPLICATES_MAX {
+        if !batch.duplicates.iter().all(matches) || batch.duplicates.len() >= COPIES_MAX {
             return Err(Inconsistency::Duplicates(id));
         }
         let attempt = batch.assignment.attempt;

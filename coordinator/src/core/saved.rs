@@ -57,7 +57,7 @@ impl SavedParts {
                 continue;
             }
             evaluation.fill(indices, &results, &by);
-            if audit::is_chosen(key, job, number, first, fraction) {
+            if audit::is_saved_part_chosen(key, job, number, first, fraction) {
                 evaluation.audits.push_back(Audit { indices, by, lost: 0 });
             }
         }
@@ -101,7 +101,7 @@ pub(crate) fn take_pieces(
     if evaluation.stored != StoredRecord::Missing {
         return Vec::new();
     }
-    let sent = evaluation.pieces.send(evaluation.results.full_pieces());
+    let sent = evaluation.pieces.take(evaluation.results.full_pieces());
     let taken = sent.into_iter().filter_map(|piece| {
         let first = piece * PIECE_OUTCOMES;
         let outcomes =

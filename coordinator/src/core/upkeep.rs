@@ -49,9 +49,9 @@ impl State {
     }
 
     /// Returns the place that a worker should have; `None` if it cannot accept more, because it is gone,
-    /// drains, computes a quarantined realization, or holds as many batches as it may. That is one batch
-    /// if it is on probation, or if there are many workers and its speed at the job of a batch is not
-    /// known.
+    /// drains, holds an exclusive batch, or holds as many batches as it may, speculative ones not counted. That
+    /// is one if it is on probation, or if there are many workers and its speed at the job of a batch that it
+    /// holds is not known.
     fn place(&self, id: WorkerId) -> Option<ServicePlace> {
         let worker: &AttachedWorker = self.workers.get(&id)?;
         let is_exclusive = self.held_for(worker, Purpose::Exclusive).next().is_some();

@@ -47,7 +47,7 @@ pub(crate) struct AcceptedConnection {
     frames: Option<ControlFrames>,
     /// Time limit for the first byte; `None` once it has arrived.
     patience: Option<Pin<Box<Sleep>>>,
-    /// Permit, one of [`open_files::connections_max`].
+    /// Permit, one of those of its listener.
     _place: OwnedSemaphorePermit,
 }
 

@@ -15,8 +15,8 @@ const FILES_OF_WORKER: u64 = 3;
 /// This process may not have as many open files as it needs.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error(
-    "this process may have {limit} open files and needs {needed}: raise the limit with `ulimit -n {needed}` \
-     (`ulimit -Hn` is the most that the system allows; LimitNOFILE= of a systemd unit)"
+    "this process may have {limit} open files and needs {needed}: raise the hard limit (`ulimit -n {needed}` \
+     as root; LimitNOFILE= of a systemd unit)"
 )]
 pub struct TooFewOpenFiles {
     /// Maximum number of open files.
@@ -25,8 +25,8 @@ pub struct TooFewOpenFiles {
     pub needed: u64,
 }
 
-/// Makes sure that this process may have the open files of a coordinator and of so many workers that it starts
-/// itself. Without them connections would not be accepted, and nobody would be told why.
+/// Makes sure that this process may have the open files of a coordinator and of the `workers` workers that it
+/// starts. Without them connections would not be accepted, and nobody would be told why.
 ///
 /// # Errors
 /// If the system does not allow as many.

@@ -5,9 +5,9 @@ use crate::chart::{Axis, Chart, Ink, Shape};
 use crate::finding::Finding;
 use crate::sample::VelocitySample;
 
-/// Most velocities that are drawn one by one.
+/// Largest number of velocities that are drawn one by one.
 const DOTS_MAX: usize = 3000;
-/// Number of groups of neighbours where there are more.
+/// Largest number of groups of neighbours where there are more.
 const BLOCKS: usize = 200;
 
 /// Returns a figure of the measured velocities, and one of the model's.
@@ -28,7 +28,7 @@ pub(super) fn figures(finding: &Finding<'_>) -> Vec<Figure> {
 
 fn sequence(sample: &VelocitySample, name: String, title: String, ink: Ink) -> Figure {
     let velocities = sample.in_order();
-    let x = Axis::linear("index").with_ends(0.0, velocities.len() as f64);
+    let x = Axis::linear("place in the order").with_ends(0.0, velocities.len() as f64);
     let mut chart = Chart::new(name, title, x, Axis::linear("velocity (m/s)"));
     chart.description = format!("{} velocities.", sample.len());
     let reading = if velocities.len() <= DOTS_MAX {

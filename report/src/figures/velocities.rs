@@ -136,36 +136,37 @@ impl ComparedSamples<'_> {
     fn transform(&self, name: String, title: String) -> Option<Figure> {
         let (model, measured) = (self.model?, self.measured?);
         let count = measured.len();
-        let places = match count {
+        let bins = match count {
             0..50 => 5_u32,
             50..400 => 10,
             _ => 20,
         };
-        let mut counts = vec![0.0; places as usize];
+        let mut counts = vec![0.0; bins as usize];
         for velocity in measured.in_order() {
-            let place = (model.share_below(*velocity) * f64::from(places)) as usize;
-            counts[place.min(places as usize - 1)] += 1.0;
+            let bin = (model.share_below(*velocity) * f64::from(bins)) as usize;
+            counts[bin.min(bins as usize - 1)] += 1.0;
         }
-        let width = 1.0 / f64::from(places);
-        let relative = |count_here: f64| count_here * f64::from(places) / count as f64;
-        let bars = counts.iter().enumerate().map(|(place, here)| {
-            [place as f64 * width, (place as f64 + 1.0) * width, relative(*here)]
-        });
+        let width = 1.0 / f64::from(bins);
+        let relative = |count_here: f64| count_here * f64::from(bins) / count as f64;
+        let bars = counts
+            .iter()
+            .enumerate()
+            .map(|(bin, here)| [bin as f64 * width, (bin as f64 + 1.0) * width, relative(*here)]);
         // Each count has a binomial law; the model's own sampling noise adds to it.
         let variance =
-            (1.0 - width) * f64::from(places) * (1.0 / count as f64 + 1.0 / model.len() as f64);
+            (1.0 - width) * f64::from(bins) * (1.0 / count as f64 + 1.0 / model.len() as f64);
         let half = NORMAL_95 * libm::sqrt(variance);
         let x = Axis::linear("model's distribution function at a measured velocity");
         let y = Axis::linear("velocities relative to the expected number");
         let mut chart = Chart::new(name, title, x.with_ends(0.0, 1.0), y);
-        chart.description = format!("{} {places} places of equal probability.", self.describe());
+        chart.description = format!("{} {bins} bins of equal probability.", self.describe());
         let band = [0.0, 1.0].map(|x| [x, (1.0 - half).max(0.0), 1.0 + half]);
         chart.layer("expected, 95 % of the bars", Ink::Muted, Shape::Band(band.to_vec()));
         chart.layer("measured", Ink::Second, Shape::Bars(bars.collect()));
         chart.layer("", Ink::Muted, Shape::Level(1.0));
         let reading = format!(
             "If the data have the model's distribution all bars are equally high but for chance: of \
-             {places} bars about one in twenty leaves the band. Bars high at both ends mean that the \
+             {bins} bars about one in twenty leaves the band. Bars high at both ends mean that the \
              data scatter more than the model, high in the middle that they scatter less, a slope that \
              their mean differs."
         );

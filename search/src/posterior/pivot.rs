@@ -29,7 +29,7 @@ impl Pivots {
     pub(super) fn choose(priors: &[ParameterPrior], structure: &BoneStructure, at: &Point) -> Self {
         let gradient =
             structure.bulk_velocity(at).map_or([1.0; PARAMETERS], |velocity| velocity.gradient);
-        let free = priors.iter().filter(|prior| is_in_closed_form(prior.parameter));
+        let free = priors.iter().filter(|prior| influences_bulk_velocity(prior.parameter));
         let influence = |prior: &&ParameterPrior| {
             let whole = (gradient[prior.parameter as usize] * prior.middle_half()).abs();
             let last = prior.parameter == Parameter::LongitudinalYoungModulus;
@@ -54,15 +54,15 @@ impl Pivots {
     }
 }
 
-/// Returns whether √(c1111/ρ) depends on a parameter.
-fn is_in_closed_form(parameter: Parameter) -> bool {
+/// Returns whether √(c1111/ρ) of the mean solid depends on a parameter.
+fn influences_bulk_velocity(parameter: Parameter) -> bool {
     let others = [Parameter::Dispersion, Parameter::LongitudinalShearModulus];
     let is_known = parameter.of_setup().is_none() || Parameter::OF_PORES.contains(&parameter);
     is_known && !others.contains(&parameter)
 }
 
-/// Returns the value of `pivot` with which `point` has this ln √(c1111/ρ), of a bone with these pores, or
-/// nearly that value if the bone has any: a few repetitions from the value found make it exact.
+/// Returns the value of `pivot` with which ln √(c1111/ρ) at `point` is `logarithm`: without pores exactly, with pores
+/// nearly, and a few repetitions from the value found make it exact.
 pub(super) fn solve(
     structure: &BoneStructure,
     point: &Point,
@@ -81,15 +81,16 @@ pub(super) fn solve(
 }
 
 /// Returns the value of `pivot` with which `point` has this ln √(c1111/ρ), by the paper's Eq. (7), of a bone
-/// without pores. Where there is none, c1111 is larger than wanted everywhere: then the value with which it is
-/// smallest, without regard to bounds. `None` if the point is not admissible with any density. Of two
-/// values `branch` 0 is the larger.
+/// without pores. Where no value gives it, another one, perhaps inadmissible, on which the caller's repetition does
+/// not close. Bounds are not regarded. Of two values `branch` 0 is the larger. `None` if none is finite, or if this
+/// parameter is no pivot.
 fn solve_solid(point: &Point, pivot: Parameter, logarithm: f64, branch: usize) -> Option<f64> {
     let [density, e_l, nu_l, _, e_t, nu_t, ..] = point.0;
     let stiffness = density * libm::exp(2.0 * logarithm);
     let (a, b) = (1.0 - nu_t, 2.0 * e_t * nu_l * nu_l);
     // c1111 = e_L² a / (e_L a - b).
-    let wanted = e_l * a - e_l * e_l * a / stiffness;
+    // So b must be this.
+    let wanted_b = e_l * a - e_l * e_l * a / stiffness;
     let value = match pivot {
         Parameter::Density => {
             let velocity = bulk_velocity(point).ok()?;
@@ -99,8 +100,8 @@ fn solve_solid(point: &Point, pivot: Parameter, logarithm: f64, branch: usize) -
             let root = (0.25 * stiffness * stiffness - stiffness * b / a).max(0.0).sqrt();
             if branch == 0 { 0.5 * stiffness + root } else { 0.5 * stiffness - root }
         }
-        Parameter::LongitudinalPoissonRatio => (wanted.max(0.0) / (2.0 * e_t)).sqrt(),
-        Parameter::TransverseYoungModulus => wanted / (2.0 * nu_l * nu_l),
+        Parameter::LongitudinalPoissonRatio => (wanted_b.max(0.0) / (2.0 * e_t)).sqrt(),
+        Parameter::TransverseYoungModulus => wanted_b / (2.0 * nu_l * nu_l),
         Parameter::TransversePoissonRatio if stiffness <= e_l => -1.0,
         Parameter::TransversePoissonRatio => 1.0 - stiffness * b / (stiffness * e_l - e_l * e_l),
         _ => return None,

@@ -27,7 +27,7 @@ pub(super) fn merge(
 
 /// As [`merge`], but keeps the first result, with its error, if the second pass would exceed the limit
 /// of the computation.
-pub(super) fn merge_if_computed(
+pub(super) fn merge_unless_too_costly(
     prepared: &PreparedSetup,
     first: Result<Estimated, Failure>,
     second: Result<Estimated, Failure>,

@@ -20,7 +20,7 @@ use crate::media::Media;
 
 /// Number of thorough passes that find no arrival before the bone is said to have none. (A single quick
 /// or plain one leads to the thorough grade.)
-const THOROUGH_ATTEMPTS: usize = 2;
+const ACCURATE_ATTEMPTS: usize = 2;
 
 /// State of the passes for one bone.
 pub(super) struct BonePasses<'a> {
@@ -63,14 +63,14 @@ impl<'a> BonePasses<'a> {
         self.bin += 1;
         let other = self.run();
         self.bin -= 1;
-        blending::merge_if_computed(self.prepared, found, other, next)
+        blending::merge_unless_too_costly(self.prepared, found, other, next)
     }
 
     /// Makes as many passes as the bone needs in one speed bin.
     fn run(&mut self) -> Result<Estimated, Failure> {
         let Self { prepared, caches, .. } = *self;
         if sampling::first_grade(&prepared.setup) == Grade::Thorough {
-            let found = self.make_thorough_passes(&caches.thorough, LARGE_ERROR.1);
+            let found = self.make_accurate_passes(&caches.thorough, LARGE_ERROR.1);
             return self
                 .complete(found, |found| weights::large_sampling_error_weight(prepared, found));
         }
@@ -89,7 +89,7 @@ impl<'a> BonePasses<'a> {
     }
 
     /// Blends a quick or plain result with that of the thorough passes if the pick is unreliable or
-    /// missing, if its sampling error is large, or if its whole error is large after all bands. The
+    /// missing, if its sampling error is very large, or if its whole error is intolerable after all bands. The
     /// thorough passes are made once, at the first call, and kept in `thorough`.
     fn replace_doubtful(
         &mut self,
@@ -107,7 +107,7 @@ impl<'a> BonePasses<'a> {
             return found;
         }
         let thorough = thorough.get_or_insert_with(|| {
-            let thorough = self.make_thorough_passes(&caches.thorough, VERY_LARGE_ERROR.1);
+            let thorough = self.make_accurate_passes(&caches.thorough, VERY_LARGE_ERROR.1);
             self.complete(thorough, |found| {
                 weights::very_large_sampling_error_weight(prepared, found)
             })
@@ -126,8 +126,8 @@ impl<'a> BonePasses<'a> {
         if weight == 0.0 {
             return found;
         }
-        let full = self.make_thorough_passes(&self.caches.full, f64::INFINITY);
-        blending::merge_if_computed(self.prepared, found, full, weight)
+        let full = self.make_accurate_passes(&self.caches.full, f64::INFINITY);
+        blending::merge_unless_too_costly(self.prepared, found, full, weight)
     }
 
     /// Makes the quick passes. No wider band is tried after a pass without an arrival, or if the pick is
@@ -170,7 +170,7 @@ impl<'a> BonePasses<'a> {
 
     /// Makes the passes of the thorough or the full grade. No wider band is tried if the sampling error
     /// is at least `limit`: only the next grade makes that smaller.
-    fn make_thorough_passes(
+    fn make_accurate_passes(
         &mut self,
         cache: &TableCache,
         limit: f64,
@@ -187,7 +187,7 @@ impl<'a> BonePasses<'a> {
                 rise(weights::comparable_error(prepared, found.band_error), LARGE_ERROR)
             }
         };
-        self.make_passes(bin, THOROUGH_ATTEMPTS, weight, |workspace| {
+        self.make_passes(bin, ACCURATE_ATTEMPTS, weight, |workspace| {
             (&mut workspace.accurate, &mut workspace.spectra)
         })
     }

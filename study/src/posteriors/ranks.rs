@@ -10,7 +10,7 @@ const BINS: usize = 10;
 pub(super) struct Ranks([u64; BINS]);
 
 impl Ranks {
-    /// Adds a truth above `below` of `draws` draws.
+    /// Adds a truth that exceeds `below` of the `draws` draws of its posterior.
     pub(super) fn add(&mut self, below: usize, draws: usize) {
         let bin = BINS * below / (draws + 1);
         self.0[bin.min(BINS - 1)] += 1;

@@ -1,4 +1,4 @@
-//! The fluids above a rigid bone, driven on its face.
+//! The fluids above a rigid bone, driven on their lowest face.
 
 use super::fluid_stack::FluidStack;
 use super::sink::Sink;
@@ -9,7 +9,8 @@ use crate::hybrid::mesh::FluidMesh;
 use crate::lanes::Lanes;
 use crate::vector::Vector;
 
-/// The operator of the fluids above a rigid bone; a load is that of a source F on its face.
+/// The operator of the fluids above a rigid bone; a load is a force on the lowest
+/// face of the fluids, which lies on the bone.
 #[derive(Debug, Clone)]
 pub(in crate::hybrid) struct FluidColumn(FluidStack);
 
@@ -36,6 +37,8 @@ impl System for FluidColumn {
         sink: &mut S,
     ) {
         self.0.apply::<1, V, S>(k, x, out, 0, sink);
+        // The stack leaves both ends to its owner, and gives all between them to the sink: the lowest is driven, the
+        // highest is free (p = 0).
         out[0] = Lanes::splat(self.0.lower_drive()).mul_add(load, out[0]);
         let top = out.len() - 1;
         out[top] = Lanes::ZERO;

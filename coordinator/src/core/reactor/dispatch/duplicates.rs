@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{batches, eta};
 use crate::core::batch::{Batch, Purpose};
 use crate::core::ids::{BatchId, WorkerId};
-use crate::core::policy::{DUPLICATES_MAX, LATE_FACTOR};
+use crate::core::policy::{COPIES_MAX, LATE_FACTOR};
 use crate::core::reactor::turn::Turn;
 use crate::core::service_order::ServicePlace;
 use crate::core::state::State;
@@ -28,7 +28,7 @@ pub(crate) fn duplicate_slow_batches(turn: &mut Turn) {
 
 /// Sends each worker that is `idle` a duplicate of the batch that has been out longest among those
 /// `worth` it. Young batches are not duplicated, because they are about to be answered: those out for
-/// less than half the target time and twice the mean delay of answers.
+/// less than half the target time plus some mean delays of answers.
 fn duplicate(
     turn: &mut Turn,
     idle: impl Fn(&ServicePlace) -> bool,
@@ -73,7 +73,7 @@ fn open_batches(state: &State) -> impl Iterator<Item = (BatchId, &Batch)> {
     batches.filter(|(id, batch)| {
         batch.purpose == Purpose::Fill
             && (batch.duplicates.is_empty()
-                || (batch.duplicates.len() + 1 < DUPLICATES_MAX
+                || (batch.duplicates.len() + 1 < COPIES_MAX
                     && batch.duplicates.iter().chain([id]).all(|copy| may_be_silent(state, *copy))))
     })
 }

@@ -19,7 +19,7 @@ use crate::core::crashes::Crashes;
 use crate::core::dispute::Dispute;
 use crate::core::ids::{BatchId, JobId, WorkerId};
 use crate::core::policy::{
-    DUPLICATES_MAX, MISSED_MAX, OVERDUE_AT_ONCE_MAX, OVERDUE_FACTOR, OVERDUE_MIN, SILENT_MAX,
+    COPIES_MAX, MISSED_MAX, OVERDUE_AT_ONCE_MAX, OVERDUE_FACTOR, OVERDUE_MIN, SILENT_MAX,
 };
 use crate::core::reactor::turn::Turn;
 use crate::core::state::{AttachedWorker, State};
@@ -41,7 +41,7 @@ pub(crate) fn tick(turn: &mut Turn) {
             let newest = batch.duplicates.iter().all(|duplicate| duplicate < id);
             // Nobody else can give the proof of a worker.
             let asked_for = !matches!(batch.purpose, Purpose::Speculative | Purpose::Proof);
-            newest && asked_for && batch.duplicates.len() + 1 < DUPLICATES_MAX
+            newest && asked_for && batch.duplicates.len() + 1 < COPIES_MAX
         })
     };
     turn.state.overdue = late.into_iter().filter(waits).collect();

@@ -108,7 +108,7 @@ fn forget_piece(stage: &mut Stage, of_attempt: u64) {
     if let Stage::Computing(PendingEvaluation { attempt, pieces, .. }) = stage
         && *attempt == of_attempt
     {
-        pieces.reported();
+        pieces.count_report();
     }
 }
 

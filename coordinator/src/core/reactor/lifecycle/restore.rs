@@ -24,11 +24,11 @@ pub struct Restored {
     ended: Vec<(JobId, EndedJob)>,
     /// Each with the number of its stored evaluations.
     unfinished: Vec<(JobRecord, u64)>,
-    /// Results of incomplete evaluations of these, by their jobs.
+    /// Saved results of the incomplete evaluations of unfinished jobs.
     parts: BTreeMap<JobId, Vec<PartRecord>>,
     banned: Vec<BanRecord>,
     doubts: Vec<DoubtRecord>,
-    /// Digests of the results of the ended jobs among these.
+    /// Digests of the ended jobs that have doubts.
     digests: BTreeMap<JobId, String>,
     last_deleted_job: Option<JobId>,
 }
@@ -41,7 +41,7 @@ impl Restored {
     /// the ban.
     ///
     /// # Errors
-    /// When the store cannot be read or written, or an evaluation is missing in it.
+    /// When the store cannot be read or written, or the numbers of a job's evaluations have a gap.
     pub fn load(store: &mut dyn Store) -> Result<Self, StoreError> {
         let mut restored = Self::default();
         store.visit_jobs(&mut |stored| match stored.end {
@@ -51,7 +51,7 @@ impl Restored {
             None => restored.unfinished.push((stored.record, stored.evaluations)),
         })?;
         for (record, evaluations) in &mut restored.unfinished {
-            keep_numerics(store, record, evaluations)?;
+            reset_if_numerics_differ(store, record, evaluations)?;
         }
         restored.banned = store.bans()?;
         restored.doubts = store.doubts()?;
@@ -73,7 +73,7 @@ impl Restored {
 }
 
 /// Restarts a job from the beginning if its evaluations were computed with other numerics.
-fn keep_numerics(
+fn reset_if_numerics_differ(
     store: &mut dyn Store,
     record: &mut JobRecord,
     evaluations: &mut u64,
@@ -104,9 +104,9 @@ impl Restored {
         self.ended.len()
     }
 
-    /// Returns the number of banned workers.
+    /// Returns the number of bans that hold.
     pub fn banned_workers(&self) -> usize {
-        self.banned.len()
+        self.banned.iter().filter(|ban| ban.lifted.is_none()).count()
     }
 }
 
@@ -135,7 +135,7 @@ impl State {
         let durable = |record| Banned { record, store_at: None, refused: false };
         state.banned = banned.into_iter().map(durable).collect();
         for (id, mut job) in ended {
-            // Snapshots were published while the end was on its way to the store.
+            // It must be above those of the snapshots that were published before the restart.
             job.sequence = sequence(job.sequence, now);
             job.doubts = doubts_of.remove(&id).unwrap_or_default();
             state.know(id, job.request.clone());

@@ -172,7 +172,7 @@ fn cause(why: &Departure) -> Cause {
         CloseReason::Drained | CloseReason::Draining | CloseReason::Banned { .. } => {
             Cause::Announced
         }
-        CloseReason::Expired { .. } => Cause::Silence,
+        CloseReason::Expired { .. } => Cause::LeaseExpired,
         CloseReason::Unanswering { .. }
         | CloseReason::NotReading
         | CloseReason::Malformed(_)
