@@ -59,7 +59,7 @@ impl Sublayers {
 
     /// Returns the thickness of all together, m.
     pub fn thickness(&self) -> f64 {
-        self.lower.iter().fold(self.uppermost.thickness, |sum, next| sum + next.thickness)
+        whole_thickness(self.iter().map(|one| one.thickness))
     }
 
     /// Returns the same bone with neighbours of one solid as one sublayer.
@@ -75,6 +75,11 @@ impl Sublayers {
         }
         Self { uppermost, lower }
     }
+}
+
+/// Returns the sum of thicknesses (m), downwards, so that files, messages and cases have the same bits; 0 without any.
+pub fn whole_thickness(mut downwards: impl Iterator<Item = f64>) -> f64 {
+    downwards.next().map_or(0.0, |uppermost| downwards.fold(uppermost, |sum, next| sum + next))
 }
 
 /// The bone of a case.

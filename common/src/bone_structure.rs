@@ -1,4 +1,4 @@
-//! What a job's bone consists of: one solid, pores, or sublayers.
+//! The structure of a job's bone: one solid, a solid with pores, or a stack of sublayers.
 //!
 //! A porosity is a quantity of the setup, as the bone's thickness is. Where there is one, the mean model of a
 //! point (density and engineering constants) is that of the bone between the pores, and density and mean
@@ -161,7 +161,7 @@ impl BoneStructure {
         self.porosity.or_else(|| self.profile.mean())
     }
 
-    /// Returns the pores with the porosities of a point, where it has any.
+    /// Returns the pores alone, with the porosities of a point where it has any.
     fn at(&self, point: &Point) -> Self {
         let searched = |parameter: Parameter, own: Option<f64>| {
             let value = Some(point.get(parameter)).filter(|_| point.has(parameter));
@@ -174,7 +174,8 @@ impl BoneStructure {
                 marrow: searched(Parameter::MarrowPorosity, self.profile.marrow),
                 ..self.profile.clone()
             },
-            ..self.clone()
+            model: self.model,
+            sublayers: Vec::new(),
         }
     }
 
@@ -182,7 +183,7 @@ impl BoneStructure {
     /// through the thickness, it is that of the mean porosity; of sublayers it is the mean by thickness.
     ///
     /// # Errors
-    /// If the mean model of the point is not admissible, or has no stiffness with these pores.
+    /// If the mean model of the point is not admissible, or has no stiffness with its pores.
     pub fn mean_solid(&self, point: &Point) -> Result<Bone, NoPorousBone> {
         let matrix = point.mean_model();
         if self.is_layered() {
@@ -201,7 +202,7 @@ impl BoneStructure {
     /// Same as [`BoneStructure::mean_solid`].
     pub fn bulk_velocity(&self, point: &Point) -> Result<BulkVelocity, NoPorousBone> {
         let of_matrix = bulk_velocity(point)?;
-        if !self.at(point).is_given() {
+        if !self.is_layered() && !self.at(point).is_given() {
             return Ok(of_matrix);
         }
         let mut gradient = [0.0; PARAMETERS];
@@ -236,14 +237,14 @@ impl BoneStructure {
     /// # Errors
     /// Same as [`BoneStructure::mean_solid`].
     pub fn bulk_logarithm(&self, point: &Point) -> Result<f64, NoPorousBone> {
-        if !self.at(point).is_given() {
+        if !self.is_layered() && !self.at(point).is_given() {
             return Ok(bulk_velocity(point)?.logarithm);
         }
         let Bone { density, elasticity } = self.mean_solid(point)?;
         Ok(0.5 * libm::log(elasticity.rows()[0][0] / density))
     }
 
-    /// Returns the bone that a matrix with these pores is, with `realize` of each of its solids in place of
+    /// Returns the bone of this structure between whose pores is `matrix`, with `realize` of each of its solids in place of
     /// that; `thickness` (m) is that of the bone.
     ///
     /// # Errors

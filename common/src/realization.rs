@@ -134,7 +134,7 @@ impl Ensemble {
         Ok(Realization { own_setup, bone })
     }
 
-    /// Returns the bone at `index` of a setup without pores. What may have some needs
+    /// Returns the bone at `index` of a setup without pores and sublayers. What may have some needs
     /// [`Ensemble::realization`].
     ///
     /// # Errors

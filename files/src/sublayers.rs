@@ -1,6 +1,6 @@
 //! The list `sublayers` of a section `[bone]`.
 
-use osteon_common::bone::Sublayers;
+use osteon_common::bone::{self, Sublayers};
 use osteon_common::check;
 use osteon_common::field_path::element_path;
 use osteon_common::limits::SUBLAYERS_MAX;
@@ -120,11 +120,11 @@ fn sublayer<T>(
 /// Returns the thickness of all sublayers together, if it can be that of a bone.
 fn whole_thickness<T>(
     reader: &mut Reader,
-    bone: &Table<'_>,
+    table: &Table<'_>,
     sublayers: &[(f64, T)],
 ) -> Option<f64> {
-    let thickness = sublayers.iter().map(|one| one.0).reduce(|sum, next| sum + next)?;
-    let (path, mut found) = (bone.path(KEY), Violations::new());
+    let thickness = bone::whole_thickness(sublayers.iter().map(|one| one.0));
+    let (path, mut found) = (table.path(KEY), Violations::new());
     if reader.violations.has_at_or_below(&path) {
         return None;
     }

@@ -311,9 +311,13 @@ fn job() -> impl Strategy<Value = JobSpecification> {
         setup
     });
     (any::<bool>(), setup, data(), parameters, settings).prop_map(
-        |(identification, setup, data, parameters, settings)| {
+        |(identification, mut setup, data, parameters, settings)| {
             let mut data = data;
             let (random, monte_carlo, mut search, objective, posterior) = settings;
+            let has_posterior = posterior.is_some() || search.method == SearchMethod::Posterior;
+            if has_posterior && setup.structure.is_layered() {
+                setup.structure = BoneStructure::default();
+            }
             let random = scattered(random, &setup);
             let (rho, e_l, nu_l, g_l, e_t, nu_t, delta) = parameters;
             let mut parameters = Range::of_bone([rho, e_l, nu_l, g_l, e_t, nu_t, delta]);
@@ -450,6 +454,10 @@ properties! {
         job.data.get_or_insert(Data::from_moments(1.0, 1.0));
         for (edit, value) in edits {
             edit(&mut job, value);
+        }
+        // A file has no other thickness for a bone of sublayers.
+        if job.setup.structure.is_layered() {
+            job.setup.layers.bone_thickness = thickness(&job.setup.structure.sublayers);
         }
         let job = job.with_implied(Omitted::default());
         let expected: BTreeSet<_> = job.check().iter().map(ToString::to_string).collect();

@@ -1,10 +1,11 @@
 //! The sublayers of a job's bone as messages.
 
-use osteon_common::bone::Bone;
+use osteon_common::bone::{Bone, Sublayers};
 use osteon_common::bone_structure::{MeanSolid, MeanSublayer, thickness};
 use osteon_common::case::Setup;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::field_path::element_path;
+use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::setup_quantity::SetupQuantity;
 use osteon_common::violations::Violations;
 
@@ -37,7 +38,7 @@ pub(crate) fn from_messages(
     setup: &mut Setup,
     violations: &mut Violations,
 ) {
-    let most = MeanSublayer::COUNT_MAX;
+    let most = SUBLAYERS_MAX;
     let count = message.sublayers.len();
     if count > most {
         return violations.add(FIELD, format!("has {count} elements; at most {most} are accepted"));
@@ -71,7 +72,7 @@ fn sublayer(
     let field = |key: &str| format!("{}.{key}", element_path(FIELD, index));
     if thickness.is_none() {
         violations
-            .add(field("thickness"), format!("is missing; it must be {}", MeanSublayer::THICKNESS));
+            .add(field("thickness"), format!("is missing; it must be {}", Sublayers::THICKNESS));
     }
     let beside = density.is_some() || !mandel.is_empty();
     let solid = match porosity {

@@ -180,7 +180,7 @@ class Job:
         they are those with pores.
 
         Raises:
-            InputError: the porosity changes through the thickness.
+            InputError: the bone changes through the thickness.
 
         >>> import osteon
         >>> osteon.Job.read("examples/fast.toml").ensemble().draw(4).shape

@@ -31,9 +31,11 @@ impl PyEnsemble {
     /// If its bones have several tensors each.
     pub(crate) fn of_job(ensemble: Ensemble, setup: Setup) -> PyResult<Self> {
         if setup.structure.profile.is_given() || setup.structure.is_layered() {
-            let message = "changes through the thickness, so that each sublayer of a realization has a tensor of \
+            let message = "makes bone that changes through the thickness, so that each sublayer of a realization has a tensor of \
                            its own; `osteon draw` writes all of them";
-            return Err(errors::bad_input("bone.porosity", message));
+            let field =
+                if setup.structure.is_layered() { "bone.sublayers" } else { "bone.porosity" };
+            return Err(errors::bad_input(field, message));
         }
         let (ensemble, setup) = (Box::new(ensemble), Box::new(setup));
         Ok(Self { source: Bones::Job { ensemble, setup } })

@@ -29,13 +29,13 @@ impl SearchBox {
         Self { ranges, structure: BoneStructure::default() }
     }
 
-    /// Returns the box for bones with these pores.
+    /// Returns the box for bones of this structure.
     #[must_use]
     pub fn with_structure(self, structure: BoneStructure) -> Self {
         Self { structure, ..self }
     }
 
-    /// Returns the pores of the setup; a point may have porosities of its own.
+    /// Returns the structure of the bone in the setup; a point may have porosities of its own.
     pub(crate) fn structure(&self) -> &BoneStructure {
         &self.structure
     }
@@ -114,7 +114,7 @@ impl SearchBox {
     }
 }
 
-/// Returns whether realizations can be drawn at `point`, of a bone with these pores.
+/// Returns whether realizations can be drawn at `point`, of a bone of this structure.
 pub fn admissible(structure: &BoneStructure, point: &Point) -> bool {
     let dispersion = point.dispersion();
     dispersion > 0.0 && dispersion < DISPERSION_MAX && structure.mean_solid(point).is_ok()

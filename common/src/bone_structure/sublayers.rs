@@ -1,9 +1,7 @@
 //! The sublayers of a job's bone.
 
-use crate::accepted::Interval;
-use crate::bone::{Bone, Sublayer, Sublayers};
+use crate::bone::{Bone, Sublayer, whole_thickness};
 use crate::elasticity::Elasticity;
-use crate::limits::SUBLAYERS_MAX;
 use crate::porosity::{BoneMatrix, NoPorousBone, PorosityModel};
 
 /// A sublayer of the bone of a job.
@@ -11,7 +9,7 @@ use crate::porosity::{BoneMatrix, NoPorousBone, PorosityModel};
 pub struct MeanSublayer {
     /// Thickness, m, where the bone has the thickness of all together; otherwise it is in proportion.
     pub thickness: f64,
-    /// What it consists of.
+    /// Its solid.
     pub solid: MeanSolid,
 }
 
@@ -22,13 +20,6 @@ pub enum MeanSolid {
     Porous(f64),
     /// This one, whatever the point.
     Given(Box<Bone>),
-}
-
-impl MeanSublayer {
-    /// The thicknesses that a sublayer may have.
-    pub const THICKNESS: Interval = Sublayers::THICKNESS;
-    /// The largest number of them.
-    pub const COUNT_MAX: usize = SUBLAYERS_MAX;
 }
 
 impl MeanSolid {
@@ -46,7 +37,7 @@ impl MeanSolid {
 
 /// Returns the thickness of all together, m.
 pub fn thickness(sublayers: &[MeanSublayer]) -> f64 {
-    sublayers.iter().map(|one| one.thickness).reduce(|sum, next| sum + next).unwrap_or(0.0)
+    whole_thickness(sublayers.iter().map(|one| one.thickness))
 }
 
 /// Returns the sublayers of a bone of this `thickness` (m), with `realize` of each solid in place of that.

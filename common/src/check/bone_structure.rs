@@ -1,10 +1,12 @@
 //! Rules on the pores and the sublayers of a job's bone.
 
+use crate::bone::Sublayers;
 use crate::bone_structure::{
     BoneStructure, MeanSolid, MeanSublayer, PorosityProfile, ProfileShape, SUBLAYERS,
 };
 use crate::field_path::element_path;
 use crate::job::{JobSpecification, Range};
+use crate::limits::SUBLAYERS_MAX;
 use crate::parameters::{Parameter, Point};
 use crate::porosity::{BoneMatrix, PorosityModel};
 use crate::setup_quantity::SetupQuantity;
@@ -51,7 +53,7 @@ pub(super) fn bone_structure(structure: &BoneStructure, violations: &mut Violati
 /// Checks the sublayers, each by itself, and that nothing else says what the bone consists of.
 fn sublayers(structure: &BoneStructure, violations: &mut Violations) {
     const FIELD: &str = "bone.sublayers";
-    let (count, most) = (structure.sublayers.len(), MeanSublayer::COUNT_MAX);
+    let (count, most) = (structure.sublayers.len(), SUBLAYERS_MAX);
     if known_wrong(FIELD, violations) || count == 0 {
         return;
     }
@@ -68,7 +70,7 @@ fn sublayers(structure: &BoneStructure, violations: &mut Violations) {
     for (index, MeanSublayer { thickness, solid }) in structure.sublayers.iter().enumerate() {
         let field = |key: &str| format!("{}.{key}", element_path(FIELD, index));
         let kind = Parameter::BoneThickness.row().plausible;
-        quantity(&field("thickness"), *thickness, MeanSublayer::THICKNESS, kind, violations);
+        quantity(&field("thickness"), *thickness, Sublayers::THICKNESS, kind, violations);
         match solid {
             MeanSolid::Porous(value) => porosity(&field("porosity"), *value, violations),
             MeanSolid::Given(bone) => {
@@ -85,7 +87,9 @@ pub(super) fn parameters_of_sublayers(
     violations: &mut Violations,
 ) {
     let structure = &specification.setup.structure;
-    if !structure.is_layered() || structure.has_pores() {
+    // A refused material stands for parameters that the file does not have.
+    let is_unknown = violations.has_at_or_below("parameters.material");
+    if !structure.is_layered() || structure.has_pores() || is_unknown {
         return;
     }
     let unused = Point::of_matrix(&BoneMatrix::default(), 0.0);

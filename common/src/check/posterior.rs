@@ -44,6 +44,12 @@ pub(super) fn posterior_of_job(specification: &JobSpecification, violations: &mu
         }
         return;
     }
+    if specification.setup.structure.is_layered() && !known_wrong("posterior", violations) {
+        // The solution for a pivot takes it that the whole bone follows the parameters.
+        let message = "is not computed for a bone with bone.sublayers; leave it out, or describe the bone by a \
+                       profile of bone.porosity";
+        violations.add("posterior", message);
+    }
     posterior(specification, settings, violations);
     let realizations = "monte_carlo.realizations";
     if specification.monte_carlo.realizations == 1 && !known_wrong(realizations, violations) {

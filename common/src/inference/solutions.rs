@@ -25,7 +25,7 @@ pub fn solutions(set: usize, history: &[Evaluation]) -> Vec<Solution> {
     solutions
 }
 
-/// Returns the spreads over points, of a bone with these pores; `None` if there are none.
+/// Returns the spreads over points, of a bone of this structure; `None` if there are none.
 pub fn spread(points: &[Point], structure: &BoneStructure) -> Option<Spreads> {
     let of = |values: &mut dyn Iterator<Item = f64>| {
         let mut spread = Spread { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, mean: 0.0 };

@@ -1,10 +1,12 @@
 //! The JSON Schema of job files, by which editors complete them.
 
-use osteon_common::bone_structure::{BoneStructure, MeanSublayer, PorosityProfile};
+use osteon_common::bone::Sublayers;
+use osteon_common::bone_structure::{BoneStructure, PorosityProfile};
 use osteon_common::case::Setup;
 use osteon_common::check::{COUNT, REPEATABILITY};
 use osteon_common::fields::{Choice, DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
+use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::observables::Observable;
 use osteon_common::parameters::Parameter;
 use osteon_common::porosity::{self, POROSITY, PorosityModel};
@@ -12,6 +14,7 @@ use osteon_common::pulse::{PulseForm, TONE_CYCLES};
 use osteon_common::pulse_samples::{SAMPLES, STEP};
 use serde_json::{Map, Value as Json, json};
 
+use crate::materials::Material;
 use crate::{materials, pulse};
 
 use super::csv_format::{LINES, MISSING_MAX};
@@ -170,18 +173,18 @@ fn sublayers() -> Json {
         json!({ "type": "array", "items": { "type": "number" }, "minItems": 6, "maxItems": 6 });
     let matrix = json!({ "type": "array", "items": row, "minItems": 6, "maxItems": 6 });
     let mut properties = json!({
-        "thickness": said_to_be(number(None, MeanSublayer::THICKNESS), "thickness, m"),
+        "thickness": said_to_be(number(None, Sublayers::THICKNESS), "thickness, m"),
         "mandel": said_to_be(matrix, "elasticity: the Kelvin-Mandel matrix, Pa, in the order 11 22 33 23 31 12"),
         materials::KEY: said_to_be(json!({ "enum": materials::NAMES }), "name of a material"),
         POROSITY.name: said_to_be(number(None, porosity::ACCEPTED), "porosity, instead of all others"),
     });
-    for parameter in Parameter::OF_BONE.into_iter().filter(|one| *one != Parameter::Dispersion) {
+    for parameter in Material::PARAMETERS {
         let value = number(None, parameter.row().accepted);
         properties[parameter.name()] = said_to_be(value, &meaning(parameter));
     }
     let mut element = said_to_be(object(properties), "one of sublayers");
     element["required"] = json!(["thickness"]);
-    json!({ "type": "array", "items": element, "minItems": 1, "maxItems": MeanSublayer::COUNT_MAX })
+    json!({ "type": "array", "items": element, "minItems": 1, "maxItems": SUBLAYERS_MAX })
 }
 
 fn data() -> Json {

@@ -5,6 +5,7 @@ use osteon_common::bone_structure::{
     BoneStructure, MeanSolid, MeanSublayer, PorosityProfile, ProfileShape,
 };
 use osteon_common::elasticity::Elasticity;
+use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
 use proptest::prelude::*;
 
@@ -48,7 +49,7 @@ pub(super) fn layered() -> impl Strategy<Value = BoneStructure> {
     let solid = (1500.0..2200.0, elasticity())
         .prop_map(|(density, elasticity)| MeanSolid::Given(Box::new(Bone { density, elasticity })));
     let solid = prop_oneof![(0.01..0.32).prop_map(MeanSolid::Porous), solid];
-    let lower = prop::collection::vec((thickness(), solid), 0..MeanSublayer::COUNT_MAX);
+    let lower = prop::collection::vec((thickness(), solid), 0..SUBLAYERS_MAX);
     (0.01..0.32, thickness(), lower, 0.0..1e10).prop_map(
         |(porosity, thickness, lower, bulk_modulus)| {
             let first = (thickness, MeanSolid::Porous(porosity));

@@ -23,7 +23,7 @@ pub(super) struct Pivots {
 
 impl Pivots {
     /// Chooses the pivots among the free parameters: for the mean velocity the one whose prior
-    /// leaves it most uncertain, at the point `at` of the other medians, of a bone with these pores. The
+    /// leaves it most uncertain, at the point `at` of the other medians, of a bone of this structure. The
     /// longitudinal Young modulus is chosen only if there is no other, because up to two of its values give
     /// the same velocity.
     pub(super) fn choose(priors: &[ParameterPrior], structure: &BoneStructure, at: &Point) -> Self {
@@ -61,8 +61,8 @@ fn influences_bulk_velocity(parameter: Parameter) -> bool {
     is_known && !others.contains(&parameter)
 }
 
-/// Returns the value of `pivot` with which ln √(c1111/ρ) at `point` is `logarithm`: without pores exactly, with pores
-/// nearly, and a few repetitions from the value found make it exact.
+/// Returns the value of `pivot` with which ln √(c1111/ρ) at `point` is `logarithm`: exactly for one solid without
+/// pores. For others it is near, and a few repetitions from the value found make it exact.
 pub(super) fn solve(
     structure: &BoneStructure,
     point: &Point,

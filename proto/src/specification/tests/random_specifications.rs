@@ -9,6 +9,7 @@ use osteon_common::job::{
     PosteriorPrior, PosteriorSettings, PriorDistribution, Sampling, SearchMethod,
 };
 use osteon_common::known_quantities::KnownQuantities;
+use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::extended;
 use osteon_common::porosity::{BoneMatrix, Homogenisation, PoreFluid, PorosityModel};
@@ -180,7 +181,7 @@ fn sublayers() -> impl Strategy<Value = BoneStructure> {
         MeanSolid::Given(Box::new(bone.unwrap()))
     });
     let solid = prop_oneof![porous(), given];
-    let lower = proptest::collection::vec((thickness(), solid), 0..MeanSublayer::COUNT_MAX);
+    let lower = proptest::collection::vec((thickness(), solid), 0..SUBLAYERS_MAX);
     // Random thicknesses are drawn for a bone of 4 mm at least.
     ((4e-3..5e-3, porous()), lower).prop_map(|(first, lower)| {
         let sublayer = |(thickness, solid)| MeanSublayer { thickness, solid };
@@ -294,8 +295,12 @@ prop_compose! {
         random in random(),
         posterior in proptest::option::of(posterior()),
     ) -> JobSpecification {
-        let parameters = searched(parameters, &setup, chosen);
         let needs_noise = posterior.is_some() || method == SearchMethod::Posterior;
+        let mut setup = setup;
+        if needs_noise && setup.structure.is_layered() {
+            setup.structure = BoneStructure::default();
+        }
+        let parameters = searched(parameters, &setup, chosen);
         let data = data.map(|data| if needs_noise { counted(data) } else { data });
         let data = data.map(|data| knowing_what_is_not_searched(data, &parameters, &setup));
         let posterior = posterior.filter(|_| data.is_some()).map(|mut posterior| {
