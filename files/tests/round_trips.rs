@@ -11,7 +11,7 @@ use std::path::Path;
 
 use osteon_common::attenuation::Attenuation;
 use osteon_common::bone::{Bone, CaseBone, Sublayer, Sublayers};
-use osteon_common::bone_structure::{BoneStructure, thickness};
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::case::{Case, Setup};
 use osteon_common::data::numbered;
 use osteon_common::job::{
@@ -303,16 +303,11 @@ fn job() -> impl Strategy<Value = JobSpecification> {
     let objective = prop::sample::select(Objective::ALL.to_vec());
     let settings = (random(), monte_carlo(), search(), objective, posterior());
     let structure = prop_oneof![random_bones::structure(), random_bones::layered()];
-    let setup = (setup(), prop::option::of(structure)).prop_map(|(mut setup, structure)| {
-        setup.structure = structure.unwrap_or_default();
-        if setup.structure.is_layered() {
-            setup.layers.bone_thickness = thickness(&setup.structure.sublayers);
-        }
-        setup
+    let setup = (setup(), prop::option::of(structure)).prop_map(|(setup, structure)| {
+        random_bones::with_structure(setup, structure.unwrap_or_default())
     });
     (any::<bool>(), setup, data(), parameters, settings).prop_map(
-        |(identification, mut setup, data, parameters, settings)| {
-            let mut data = data;
+        |(identification, mut setup, mut data, parameters, settings)| {
             let (random, monte_carlo, mut search, objective, posterior) = settings;
             let has_posterior = posterior.is_some() || search.method == SearchMethod::Posterior;
             if has_posterior && setup.structure.is_layered() {
@@ -456,9 +451,8 @@ properties! {
             edit(&mut job, value);
         }
         // A file has no other thickness for a bone of sublayers.
-        if job.setup.structure.is_layered() {
-            job.setup.layers.bone_thickness = thickness(&job.setup.structure.sublayers);
-        }
+        let structure = job.setup.structure.clone();
+        job.setup = random_bones::with_structure(job.setup, structure);
         let job = job.with_implied(Omitted::default());
         let expected: BTreeSet<_> = job.check().iter().map(ToString::to_string).collect();
         let text = job_file::to_toml(&job);

@@ -2,8 +2,9 @@
 
 use osteon_common::bone::Bone;
 use osteon_common::bone_structure::{
-    BoneStructure, MeanSolid, MeanSublayer, PorosityProfile, ProfileShape,
+    BoneStructure, MeanSolid, MeanSublayer, PorosityProfile, ProfileShape, thickness,
 };
+use osteon_common::case::Setup;
 use osteon_common::elasticity::Elasticity;
 use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::porosity::{Homogenisation, PoreFluid, PorosityModel};
@@ -60,6 +61,14 @@ pub(super) fn layered() -> impl Strategy<Value = BoneStructure> {
             BoneStructure { sublayers, model, ..BoneStructure::default() }
         },
     )
+}
+
+/// Returns a setup with this structure of the bone: with sublayers, its thickness is that of all together.
+pub(super) fn with_structure(mut setup: Setup, structure: BoneStructure) -> Setup {
+    if structure.is_layered() {
+        setup.layers.bone_thickness = thickness(&structure.sublayers);
+    }
+    Setup { structure, ..setup }
 }
 
 /// Positive definite, of any size between 1 Pa and 1e12 Pa, with all 36 entries.
