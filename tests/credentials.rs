@@ -156,8 +156,8 @@ fn a_coordinator_is_open_to_others_with_tls_and_tokens_only() {
     check("0.0.0.0:0", &["--tokens"], &[], "tokens would be readable on their way");
     check("0.0.0.0:0", &["--tokens"], &["--insecure"], "cannot be used with");
     check("0.0.0.0:0", &tls, &["--insecure"], "cannot be used with");
-    check("0.0.0.0:0", &tls, &[], "with TLS, --tokens FILE is required");
-    check("127.0.0.1:0", &tls, &[], "with TLS, --tokens FILE is required");
+    check("0.0.0.0:0", &tls, &[], "with TLS, --tokens FILE or --token-file FILE is required");
+    check("127.0.0.1:0", &tls, &[], "with TLS, --tokens FILE or --token-file FILE is required");
     check(
         "unix:/tmp/a",
         &[&tls[..], &["--tokens"]].concat(),
