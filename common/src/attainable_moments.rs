@@ -58,7 +58,11 @@ impl AttainableMoments {
         // Quantities of the setup that are searched are held at their starts: within their bounds they
         // change the mean by less than MEAN_EXCESS_MAX.
         let setup = Point(ranges.map(|range| range.start())).setup(setup);
-        let scatter = scatter_of_velocity(ranges, &setup, random);
+        // Without a range of the velocities what random quantities add to their scatter has no bound.
+        let scatter = match setup.structure.is_layered() && random.is_any() {
+            true => f64::INFINITY,
+            false => scatter_of_velocity(ranges, &setup, random),
+        };
         Self {
             velocity: velocities(ranges, &setup),
             variation: (

@@ -156,6 +156,28 @@ impl BoneStructure {
         self.mean_porosity().is_some() || self.sublayers.iter().any(is_porous)
     }
 
+    /// Returns whether a sublayer has a solid that no parameter changes.
+    pub fn has_fixed_solids(&self) -> bool {
+        self.sublayers.iter().any(|one| matches!(one.solid, MeanSolid::Given(_)))
+    }
+
+    /// Returns the thickness of the thinnest sublayer where `thickness` is that of the bone, both in m; `None`
+    /// of a bone without sublayers.
+    pub fn thinnest(&self, thickness: f64) -> Option<f64> {
+        if let Some(count) = self.profile.of_sublayers().map(|each| each.len()) {
+            return Some(thickness / count as f64);
+        }
+        let scale = thickness / sublayers::thickness(&self.sublayers);
+        self.sublayers.iter().map(|one| one.thickness * scale).reduce(f64::min)
+    }
+
+    /// Returns whether a parameter has no effect, because each sublayer has a solid of its own.
+    pub fn ignores(&self, parameter: Parameter) -> bool {
+        let is_of_matrix =
+            Parameter::OF_BONE.contains(&parameter) && parameter != Parameter::Dispersion;
+        is_of_matrix && self.is_layered() && !self.has_pores()
+    }
+
     /// Returns the porosity, or the mean of its profile through the thickness; `None` without either.
     pub fn mean_porosity(&self) -> Option<f64> {
         self.porosity.or_else(|| self.profile.mean())

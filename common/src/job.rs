@@ -190,12 +190,18 @@ impl JobSpecification {
         self.parameters[parameter as usize]
     }
 
-    /// Returns the parameters that have a range of their own: all of the bone, and those of the setup
-    /// that are searched.
+    /// Returns the parameters that have a range of their own: all of the bone that have an effect, and
+    /// those of the setup that are searched.
     pub fn parameters_ranged(&self) -> impl Iterator<Item = Parameter> + '_ {
         let is_free = |parameter: &Parameter| matches!(self.range(*parameter), Range::Free { .. });
         let searched = Parameter::OF_SETUP.into_iter().filter(is_free);
-        Parameter::OF_BONE.into_iter().chain(searched)
+        self.parameters_of_bone().chain(searched)
+    }
+
+    /// Returns the parameters of the bone that have an effect.
+    fn parameters_of_bone(&self) -> impl Iterator<Item = Parameter> + '_ {
+        let structure = &self.setup.structure;
+        Parameter::OF_BONE.into_iter().filter(|parameter| !structure.ignores(*parameter))
     }
 
     /// Returns the parameters that points of an identification have: those with a range, and quantities
@@ -207,7 +213,7 @@ impl JobSpecification {
             let is_free = matches!(self.range(*parameter), Range::Free { .. });
             is_free || known.get(*parameter).is_some()
         };
-        Parameter::OF_BONE.into_iter().chain(Parameter::OF_SETUP.into_iter().filter(has))
+        self.parameters_of_bone().chain(Parameter::OF_SETUP.into_iter().filter(has))
     }
 
     /// Returns the ranges for set number `set` of the data: what is known of it is fixed.

@@ -94,11 +94,16 @@ impl SetupQuantity {
         }
     }
 
-    /// Returns what a message says of the key of the mean if the setup has none.
-    pub(crate) fn lacking(self) -> &'static str {
+    /// Returns what a message says of the key of the mean if `setup` has none.
+    pub(crate) fn lacking(self, setup: &Setup) -> &'static str {
         match self {
             Self::CouplingSoundSpeed => {
                 "is replaced by the sublayers of the coupling; leave out either these or this table"
+            }
+            Self::Porosity | Self::SurfacePorosity | Self::MarrowPorosity
+                if setup.structure.is_layered() =>
+            {
+                "is replaced by bone.sublayers; leave out either these or this table"
             }
             _ => "is not given; give both",
         }

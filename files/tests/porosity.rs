@@ -128,6 +128,22 @@ fn a_job_has_sublayers_of_any_solids() {
     assert!(refused.as_ref().unwrap_err().contains(expected), "{refused:?}");
 }
 
+/// No closed form tells the scatter that a random tilt gives the velocities of sublayers.
+#[test]
+fn data_of_sublayers_may_scatter_by_the_setup_alone() {
+    let read = |random: &str| {
+        let text = format!(
+            "[[bone.sublayers]]\nthickness = 3e-3\nporosity = 0.1\n[data]\nmean = 3900.0\n\
+             coefficient_of_variation = 0.05\ncount = 50\n[parameters.dispersion]\nstart = 0.01\n\
+             bounds = [0.005, 0.02]\n{random}"
+        );
+        job_file::parse(&text, Format::Toml, Path::new(""), JobKind::Identification)
+    };
+    let refused = read("").unwrap_err().to_string();
+    assert!(refused.contains("data.coefficient_of_variation"), "{refused}");
+    read("[random.probe_tilt]\nstandard_deviation = 0.01").unwrap();
+}
+
 /// As with a material, nothing but the values goes on.
 #[test]
 fn the_complete_case_has_the_values_and_no_porosity() {

@@ -1,5 +1,6 @@
 //! A job's specification as a message.
 
+use osteon_common::bone_structure::BoneStructure;
 use osteon_common::check;
 use osteon_common::data::numbered;
 use osteon_common::job::{
@@ -8,7 +9,8 @@ use osteon_common::job::{
 };
 use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::observables::ObservedColumns;
-use osteon_common::parameters::{PARAMETERS, Parameter};
+use osteon_common::parameters::{PARAMETERS, Parameter, Point};
+use osteon_common::porosity::BoneMatrix;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::violations::Violations;
 
@@ -82,18 +84,23 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
     if let Some(message) = &message.objective {
         fields::from_message("objective", message, &mut objective, violations);
     }
+    let setup = setup::from_messages(
+        message.layers.as_ref(),
+        message.probe.as_ref(),
+        message.picking.as_ref(),
+        message.solver.as_ref(),
+        message.bone.as_ref(),
+        violations,
+    );
     let specification = JobSpecification {
         kind,
-        setup: setup::from_messages(
-            message.layers.as_ref(),
-            message.probe.as_ref(),
-            message.picking.as_ref(),
-            message.solver.as_ref(),
-            message.bone.as_ref(),
+        data: message.data.as_ref().and_then(|data| data_from_message(data, violations)),
+        parameters: parameters_from_message(
+            message.parameters.as_ref(),
+            &setup.structure,
             violations,
         ),
-        data: message.data.as_ref().and_then(|data| data_from_message(data, violations)),
-        parameters: parameters_from_message(message.parameters.as_ref(), violations),
+        setup,
         random,
         monte_carlo,
         objective,
@@ -239,11 +246,14 @@ fn parameters_to_message(ranges: &[Range; PARAMETERS]) -> v1::Parameters {
     message
 }
 
+/// Returns the ranges; parameters without effect may be left out.
 fn parameters_from_message(
     message: Option<&v1::Parameters>,
+    structure: &BoneStructure,
     violations: &mut Violations,
 ) -> [Range; PARAMETERS] {
     let mut message = message.cloned().unwrap_or_default();
+    let unused = Point::of_matrix(&BoneMatrix::default(), 0.0);
     Parameter::ALL.map(|parameter| {
         let range = range_slot(&mut message, parameter).as_ref();
         match range.and_then(|range| range.range.as_ref()) {
@@ -252,6 +262,9 @@ fn parameters_from_message(
                 Range::Free { start: free.start, lower: free.lower, upper: free.upper }
             }
             None if range.is_none() && parameter.of_setup().is_some() => Range::AS_IN_SETUP,
+            None if range.is_none() && structure.ignores(parameter) => {
+                Range::Fixed(unused.get(parameter))
+            }
             None => {
                 violations.add(
                     format!("parameters.{}", parameter.name()),

@@ -53,7 +53,8 @@ class Job:
         probe: source, receivers, pulse.
         picking: criterion of the first arriving signal.
         solver: settings of the wave solver.
-        bone: pores of the bone: with a porosity, `parameters` are those of the bone between the pores.
+        bone: pores or sublayers of the bone: with a porosity, `parameters` are those of the bone between the
+            pores.
         random: scatter of quantities of the setup.
         monte_carlo: number of realizations, seed, sampling.
         objective: the function to be minimised.

@@ -70,12 +70,14 @@ impl ServedJob {
 
     /// Returns the names of the models.
     pub fn models(&self) -> Vec<&'static str> {
-        ServedModel::offered(self.has_posterior).map(ServedModel::name).collect()
+        ServedModel::offered(&self.specification, self.has_posterior)
+            .map(ServedModel::name)
+            .collect()
     }
 
     /// Returns the model of this name.
     pub(super) fn model(&self, name: &str) -> Result<ServedModel, ProtocolError> {
-        ServedModel::named(name, self.has_posterior)
+        ServedModel::named(name, &self.specification, self.has_posterior)
     }
 
     /// Returns the length of a model's input.

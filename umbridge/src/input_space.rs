@@ -180,7 +180,7 @@ impl<'a> InputSpace<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use osteon_common::case::Setup;
     use osteon_common::job::MonteCarlo;
     use osteon_common::random_quantities::RandomQuantities;
@@ -189,7 +189,7 @@ mod tests {
 
     const OPTIMUM: [f64; 7] = [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029];
 
-    fn job() -> JobSpecification {
+    pub(crate) fn job() -> JobSpecification {
         let mut parameters = Range::of_bone(OPTIMUM.map(Range::Fixed));
         parameters[6] = Range::Free { start: 0.1, lower: 0.02, upper: 0.3 };
         JobSpecification {

@@ -45,7 +45,7 @@ pub(super) fn bone_structure(structure: &BoneStructure, violations: &mut Violati
     let (mut checked, mut default) = (structure.model, PorosityModel::default());
     section("bone.porosity_model", &mut checked, &mut default, violations);
     if structure.model != default && !structure.has_pores() && !violations.has_at_or_below("bone") {
-        let message = "is given without a porosity; give bone.porosity, or leave it out";
+        let message = "is given without a porosity; give bone.porosity, or sublayers with one, or leave it out";
         violations.add("bone.porosity_model", message);
     }
 }
@@ -89,11 +89,11 @@ pub(super) fn parameters_of_sublayers(
     let structure = &specification.setup.structure;
     // A refused material stands for parameters that the file does not have.
     let is_unknown = violations.has_at_or_below("parameters.material");
-    if !structure.is_layered() || structure.has_pores() || is_unknown {
+    if is_unknown {
         return;
     }
     let unused = Point::of_matrix(&BoneMatrix::default(), 0.0);
-    for parameter in Parameter::OF_BONE.into_iter().filter(|one| *one != Parameter::Dispersion) {
+    for parameter in Parameter::OF_BONE.into_iter().filter(|one| structure.ignores(*one)) {
         let field = format!("parameters.{}", parameter.name());
         let is_default = specification.range(parameter) == Range::Fixed(unused.get(parameter));
         if !is_default && !violations.has_at_or_below(&field) {

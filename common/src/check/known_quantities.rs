@@ -48,8 +48,13 @@ pub(super) fn known_quantities(
                 );
                 return violations.add(field, message);
             } else if known && Parameter::OF_PORES.contains(&parameter) && !has(parameter) {
-                let message = "is known of each group, and the job's bone has no such porosity; give one in \
-                               `bone`";
+                let cure = match specification.setup.structure.is_layered() {
+                    true => "leave it out, as each of bone.sublayers has a solid of its own",
+                    false => "give one in `bone`",
+                };
+                let message = format!(
+                    "is known of each group, and the job's bone has no such porosity; {cure}"
+                );
                 return violations.add(field, message);
             }
         }

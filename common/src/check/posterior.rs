@@ -44,10 +44,10 @@ pub(super) fn posterior_of_job(specification: &JobSpecification, violations: &mu
         }
         return;
     }
-    if specification.setup.structure.is_layered() && !known_wrong("posterior", violations) {
+    if specification.setup.structure.has_fixed_solids() && !known_wrong("posterior", violations) {
         // The solution for a pivot takes it that the whole bone follows the parameters.
-        let message = "is not computed for a bone with bone.sublayers; leave it out, or describe the bone by a \
-                       profile of bone.porosity";
+        let message = "is not computed for a bone of which sublayers have solids of their own; leave it out, \
+                       or give each of bone.sublayers a porosity";
         violations.add("posterior", message);
     }
     posterior(specification, settings, violations);

@@ -40,7 +40,7 @@ fn extent(
     let (table, mean_key) = (format!("random.{}", quantity.name()), quantity.mean_key());
     let scatter = random.scatter(quantity);
     let Some(mean) = quantity.value_in(setup) else {
-        let message = format!("scatters about {mean_key}, which {}", quantity.lacking());
+        let message = format!("scatters about {mean_key}, which {}", quantity.lacking(setup));
         return violations.add(table, message);
     };
     if scatter.distribution == RandomDistribution::LogNormal && mean <= 0.0 {

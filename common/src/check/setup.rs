@@ -1,12 +1,15 @@
 //! Rules on layers, probe, picking and solver.
 
-use crate::accepted::Interval;
+use crate::accepted::{Interval, written};
+use crate::bone::Sublayers;
+use crate::bone_structure::BoneStructure;
 use crate::case::Setup;
-use crate::limits;
-use crate::plausible;
+use crate::limits::{self, SUBLAYER_THICKNESS_MIN};
+use crate::plausible::{self, short};
 use crate::probe::Probe;
 use crate::sampling::pair_count;
 use crate::settings::Method;
+use crate::setup_quantity::SetupQuantity;
 use crate::violations::Violations;
 
 use super::bone_structure::bone_structure;
@@ -25,6 +28,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
         section(key.name, declared, default, violations);
     }
     bone_structure(&setup.structure, violations);
+    thinnest_sublayer(setup, violations);
     pulse(&setup.probe, violations);
     distance(&setup.probe, violations);
     one_side(&setup.probe, violations);
@@ -32,6 +36,26 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
     tilted(setup, violations);
     method(setup, violations);
     sampling(setup, violations);
+}
+
+/// Checks the thickness of the sublayers where that of the bone is not theirs together: there is a random,
+/// searched or known one, or a profile.
+fn thinnest_sublayer(setup: &Setup, violations: &mut Violations) {
+    let field = SetupQuantity::BoneThickness.mean_key();
+    if known_wrong(field, violations) || violations.has_at_or_below(BoneStructure::KEY.name) {
+        return;
+    }
+    let whole = setup.layers.bone_thickness;
+    let Some(thinnest) = setup.structure.thinnest(whole) else { return };
+    if !Sublayers::THICKNESS.contains(thinnest) {
+        let message = format!(
+            "is {}, with which the thinnest sublayer of the bone has {} m; each must have at least {} m",
+            written(whole),
+            short(thinnest),
+            written(SUBLAYER_THICKNESS_MIN)
+        );
+        violations.add(field, message);
+    }
 }
 
 /// Checks that source and receivers lie inside fluid 1: 0 < x3 < h1.

@@ -25,11 +25,10 @@ pub(super) fn setup_parameters(specification: &JobSpecification, violations: &mu
                 path,
                 format!("is fixed; leave it out, and set {} instead", quantity.mean_key()),
             ),
-            Range::Free { .. } if quantity.value_in(&specification.setup).is_none() => violations
-                .add(
-                    path,
-                    format!("is searched, and {} {}", quantity.mean_key(), quantity.lacking()),
-                ),
+            Range::Free { .. } if quantity.value_in(&specification.setup).is_none() => {
+                let lacking = quantity.lacking(&specification.setup);
+                violations.add(path, format!("is searched, and {} {lacking}", quantity.mean_key()));
+            }
             searched @ Range::Free { lower, upper, .. } => {
                 range(parameter, searched, violations);
                 let wrong = |field: &str| violations.has_at_or_below(field);

@@ -158,7 +158,11 @@ fn sublayers() {
         stack("[bone]\nporosity = 0.1", "thickness = 1e-3\nporosity = 0.1"),
         stack("[bone]\ndensity = 1800.0", "thickness = 1e-3\nporosity = 0.1"),
         stack("[parameters.porosity]\nbounds = [0.05, 0.2]", "thickness = 1e-3\nporosity = 0.1"),
-        stack("[posterior]\n", "thickness = 1e-3\nporosity = 0.1"),
+        stack("[posterior]\n", &format!("thickness = 1e-3\n{SOLID}")),
+        stack(
+            "[parameters.bone_thickness]\nbounds = [1e-3, 3e-3]",
+            "thickness = 1.5e-6\nporosity = 0.1",
+        ),
         // The thickness of the bone is given, and nothing is left of which the parameters could be.
         format!("{layers}\n[[bone.sublayers]]\nthickness = 4e-3\n{SOLID}\n"),
     ];

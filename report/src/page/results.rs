@@ -114,7 +114,10 @@ fn moments_table(numbers: &Numbers, finding: &Finding<'_>) -> Option<String> {
 }
 
 fn parameters(numbers: &Numbers, finding: &Finding<'_>) -> String {
-    let has_value = |parameter: &Parameter| finding.value(*parameter).0.is_some();
+    let structure = &finding.specification().setup.structure;
+    let has_value = |parameter: &Parameter| {
+        finding.value(*parameter).0.is_some() && !structure.ignores(*parameter)
+    };
     let rows: Vec<Vec<String>> = Parameter::ALL
         .into_iter()
         .filter(has_value)
