@@ -1,5 +1,6 @@
 use std::path::Path;
 
+use osteon_common::bone_structure::{MeanSolid, MeanSublayer};
 use osteon_common::case::Setup;
 use osteon_common::job::SearchMethod;
 use osteon_common::settings::Method;
@@ -71,6 +72,24 @@ fn absent_messages_take_the_defaults() {
         ..sparse
     };
     assert_eq!(from_message(&with_empty_messages), from_message(&message()));
+}
+
+#[test]
+fn sublayers_of_their_own_solids_need_no_constants() {
+    let solid = MeanSolid::Given(Box::new(BoneMatrix::default().bone().unwrap()));
+    let mut specification = from_message(&message()).unwrap();
+    specification.setup.structure.sublayers =
+        vec![MeanSublayer { thickness: specification.setup.layers.bone_thickness, solid }];
+    let of_matrix = Point::of_matrix(&BoneMatrix::default(), 0.0);
+    for parameter in Parameter::OF_BONE.into_iter().filter(|one| *one != Parameter::Dispersion) {
+        specification.parameters[parameter as usize] = Range::Fixed(of_matrix.get(parameter));
+    }
+    let mut message = to_message(&specification);
+    let dispersion = message.parameters.take().unwrap().dispersion;
+    message.parameters = Some(v1::Parameters { dispersion, ..v1::Parameters::default() });
+    assert_eq!(from_message(&message), Ok(specification));
+    message.bone = None;
+    assert_eq!(from_message(&message).unwrap_err().iter().count(), 6);
 }
 
 #[test]
