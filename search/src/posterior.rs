@@ -25,6 +25,7 @@ mod check;
 mod cholesky;
 mod density;
 mod draw_law;
+mod exponential;
 mod features;
 mod likelihood;
 mod moments_grid;

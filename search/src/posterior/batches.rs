@@ -87,7 +87,7 @@ impl PosteriorSearch {
         let problem =
             likelihood.and_then(|likelihood| PosteriorProblem::new(specification, likelihood));
         let (scale, observables) = match &problem {
-            Some(problem) => (problem.scale, problem.likelihood.observables()),
+            Some(problem) => (problem.scale.clone(), problem.likelihood.observables()),
             None => (Scale::from_sample(&[]), ObservableSet::NONE),
         };
         let mut search = Self {

@@ -17,7 +17,7 @@ use super::likelihood::SetLikelihood;
 use super::moments_grid::{LogSpan, MomentsGrid};
 use super::pivot::{Pivots, solve};
 use super::prior::ParameterPrior;
-use super::surrogate::{RULE_OF_THUMB, Scale, Surrogate};
+use super::surrogate::{Deviations, RULE_OF_THUMB, Scale, Surrogate};
 use crate::search_box::admissible;
 
 /// Number of points drawn from the prior for scales and ranges.
@@ -210,7 +210,7 @@ impl PosteriorProblem {
             point.0[prior.parameter as usize] = prior.quantile(u);
             *slot = u;
         }
-        let point = self.solved(model, point, draw.at, branch)?;
+        let (point, deviations) = self.solved(model, point, draw.at, branch)?;
         let mut log_prior = 0.0;
         for prior in self.priors.iter().filter(|prior| self.is_pivot(prior.parameter)) {
             log_prior += prior.log_density(point.get(prior.parameter))?;
@@ -218,7 +218,9 @@ impl PosteriorProblem {
         if !admissible(&self.structure, &point) {
             return None;
         }
-        let moments = moments(model, &self.structure, &point)?;
+        let at = features(&self.structure, &point)?;
+        let moments =
+            with_closed_form(model.mean_beside(deviations, &at), &self.structure, &point)?;
         let jacobian = self.jacobian(model, &point, [moments[0], moments[1]])?;
         let log_law = law.map_or(0.0, |law| law.log_density(&drawn));
         let log_weight = log_prior + self.likelihood.log(&moments)
@@ -230,14 +232,15 @@ impl PosteriorProblem {
     }
 
     /// Solves for the pivots: returns the point at which the model has the moments `wanted`, as far
-    /// as pivots can be chosen for that. The pivots of `point` are where the corrections begin.
+    /// as pivots can be chosen for that, and the deviations of ln v and ln Δ there. The pivots of `point` are
+    /// where the corrections begin.
     fn solved(
         &self,
         model: &Surrogate,
         mut point: Point,
         wanted: [f64; 2],
         branch: usize,
-    ) -> Option<Point> {
+    ) -> Option<(Point, [f64; 2])> {
         let first = features(&self.structure, &point).map(|at| model.mean_of_velocities(&at));
         let mut deviations = first.unwrap_or([RULE_OF_THUMB[0], RULE_OF_THUMB[1]]);
         for _ in 0..CORRECTIONS_MAX {
@@ -260,7 +263,7 @@ impl PosteriorProblem {
         let closed = closed_form(&self.structure, &point)?;
         let is_solved =
             |k: usize| (closed[k] + deviations[k] - wanted[k]).abs() <= UNSOLVED || !self.solves(k);
-        (is_solved(0) && is_solved(1)).then_some(point)
+        (is_solved(0) && is_solved(1)).then_some((point, deviations))
     }
 
     /// Returns whether a pivot is solved for ln v (0) or ln Δ (1).
@@ -376,9 +379,18 @@ pub(super) fn moments(
     structure: &BoneStructure,
     point: &Point,
 ) -> Option<MomentVector> {
-    let mut found = model.mean(&features(structure, point)?);
-    found.iter_mut().zip(closed_form(structure, point)?).for_each(|(one, closed)| *one += closed);
-    Some(found)
+    with_closed_form(model.mean(&features(structure, point)?), structure, point)
+}
+
+/// Returns the moments of these deviations at a point.
+fn with_closed_form(
+    mut deviations: Deviations,
+    structure: &BoneStructure,
+    point: &Point,
+) -> Option<MomentVector> {
+    let closed = closed_form(structure, point)?;
+    deviations.iter_mut().zip(closed).for_each(|(one, closed)| *one += closed);
+    Some(deviations)
 }
 
 /// Returns ln v and ln Δ of an interpolated model at a point.

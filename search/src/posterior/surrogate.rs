@@ -10,6 +10,7 @@ use osteon_common::moments::{MOMENTS, MomentVector};
 use osteon_common::observables::ObservableSet;
 
 use super::cholesky::{Cholesky, dot};
+use super::exponential::{LANES, Lanes, exp_of_negative};
 use super::features::{FEATURES, Features};
 
 /// The deviations at a point: of ln v, of ln Δ, and of each observable that of its mean from the data's,
@@ -47,26 +48,46 @@ const NOISE_FOR_LENGTHS: f64 = 1e-8;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Surrogate {
     scale: Scale,
-    inputs: Vec<Features>,
+    inputs: Vec<Scaled>,
     outputs: Vec<Deviations>,
     processes: [Process; MOMENTS],
     /// Whether each deviation is interpolated: not those of observables that were not measured.
     interpolated: [bool; MOMENTS],
 }
 
-/// Centre and spread of each feature; the spread is infinite where a feature does not vary.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Centre and spread of each feature that varies. The others would add nothing to any covariance, and most
+/// jobs search few parameters.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Scale {
-    centre: Features,
-    spread: Features,
+    varying: Vec<Varying>,
+}
+
+/// A feature that varies, by its number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Varying {
+    feature: usize,
+    centre: f64,
+    spread: f64,
+}
+
+/// Features that vary, by [`Scale::apply`]: as many as the scale has, then zeros.
+type Scaled = [f64; FEATURES];
+
+/// Points, [`LANES`] at a time: for each feature that varies its values at these.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Points {
+    count: usize,
+    blocks: Vec<[Lanes; FEATURES]>,
 }
 
 /// The Gaussian process of one deviation.
 #[derive(Debug, Clone, PartialEq)]
 struct Process {
-    lengths: Features,
-    /// The points that are used, by their numbers.
+    /// Length of each feature that varies.
+    lengths: Vec<f64>,
+    /// The points that are used, by their numbers, and themselves.
     used: Vec<usize>,
+    points: Points,
     /// Value about which the trend is taken.
     level: f64,
     /// Variance of the process.
@@ -79,28 +100,29 @@ impl Scale {
     /// Returns the scale of a sample of features.
     pub(super) fn from_sample(sample: &[Features]) -> Self {
         let count = sample.len().max(1) as f64;
-        let mut scale = Self { centre: [0.0; FEATURES], spread: [f64::INFINITY; FEATURES] };
-        for k in 0..FEATURES {
+        let varying = (0..FEATURES).filter_map(|k| {
             let mean = sample.iter().map(|one| one[k]).sum::<f64>() / count;
             let square: f64 = sample.iter().map(|one| (one[k] - mean) * (one[k] - mean)).sum();
             let spread = (square / count).sqrt();
-            scale.centre[k] = mean;
-            if spread > 1e-9 * (1.0 + mean.abs()) {
-                scale.spread[k] = spread;
-            }
-        }
-        scale
+            let varies = spread > 1e-9 * (1.0 + mean.abs());
+            varies.then_some(Varying { feature: k, centre: mean, spread })
+        });
+        Self { varying: varying.collect() }
     }
 
-    fn apply(&self, features: &Features) -> Features {
-        std::array::from_fn(|k| (features[k] - self.centre[k]) / self.spread[k])
+    fn apply(&self, features: &Features) -> Scaled {
+        let mut scaled = [0.0; FEATURES];
+        for (slot, one) in scaled.iter_mut().zip(&self.varying) {
+            *slot = (features[one.feature] - one.centre) / one.spread;
+        }
+        scaled
     }
 }
 
 impl Surrogate {
     /// Creates an interpolation without points, which predicts the rule of thumb.
     pub(super) fn new(scale: Scale, observables: ObservableSet) -> Self {
-        let processes = RULE_OF_THUMB.map(Process::new);
+        let processes = RULE_OF_THUMB.map(|level| Process::new(level, scale.varying.len()));
         let mut interpolated = [true; MOMENTS];
         interpolated[2..].copy_from_slice(&observables.0);
         Self { scale, inputs: Vec::new(), outputs: Vec::new(), processes, interpolated }
@@ -125,7 +147,7 @@ impl Surrogate {
             let values: Vec<f64> = self.outputs.iter().map(|output| output[k]).collect();
             if choose_lengths {
                 let from = values.len().saturating_sub(POINTS_FOR_LENGTHS_MAX);
-                process.choose_lengths(&self.inputs[from..], &values[from..], &self.scale);
+                process.choose_lengths(&self.inputs[from..], &values[from..]);
             }
             process.fit(&self.inputs, &values);
         }
@@ -134,13 +156,26 @@ impl Surrogate {
     /// Predicts the deviations at a point.
     pub(super) fn mean(&self, features: &Features) -> Deviations {
         let at = self.scale.apply(features);
-        self.of_each(|process| process.mean(&self.inputs, &at))
+        self.of_each(|process| process.mean(&at))
+    }
+
+    /// Predicts the deviations at a point at which those of ln v and ln Δ are known already.
+    pub(super) fn mean_beside(&self, known: [f64; 2], features: &Features) -> Deviations {
+        let mut deviations = [0.0; MOMENTS];
+        deviations[..2].copy_from_slice(&known);
+        if self.interpolated[2..].contains(&true) {
+            let at = self.scale.apply(features);
+            for k in (2..MOMENTS).filter(|&k| self.interpolated[k]) {
+                deviations[k] = self.processes[k].mean(&at);
+            }
+        }
+        deviations
     }
 
     /// Predicts the deviations of ln v and ln Δ alone.
     pub(super) fn mean_of_velocities(&self, features: &Features) -> [f64; 2] {
         let at = self.scale.apply(features);
-        [0, 1].map(|k| self.processes[k].mean(&self.inputs, &at))
+        [0, 1].map(|k| self.processes[k].mean(&at))
     }
 
     fn of_each(&self, value: impl Fn(&Process) -> f64) -> Deviations {
@@ -150,15 +185,30 @@ impl Surrogate {
     /// Returns the variances of the prediction at a point, as the processes expect them.
     pub(super) fn variances(&self, features: &Features) -> Deviations {
         let at = self.scale.apply(features);
-        self.of_each(|process| process.variance_at(&self.inputs, &at))
+        self.of_each(|process| process.variance_at(&at))
+    }
+}
+
+impl Points {
+    fn push(&mut self, point: &Scaled) {
+        let lane = self.count % LANES;
+        if lane == 0 {
+            self.blocks.push([[0.0; LANES]; FEATURES]);
+        }
+        if let Some(block) = self.blocks.last_mut() {
+            block.iter_mut().zip(point).for_each(|(lanes, x)| lanes[lane] = *x);
+        }
+        self.count += 1;
     }
 }
 
 impl Process {
-    fn new(level: f64) -> Self {
+    /// Creates a process of so many features.
+    fn new(level: f64, features: usize) -> Self {
         Self {
-            lengths: [FIRST_LENGTH; FEATURES],
+            lengths: vec![FIRST_LENGTH; features],
             used: Vec::new(),
+            points: Points::default(),
             level,
             variance: 1e-4,
             factor: Cholesky::default(),
@@ -166,26 +216,32 @@ impl Process {
         }
     }
 
-    /// Covariance of two points in units of the variance.
-    fn kernel(&self, a: &Features, b: &Features) -> f64 {
-        let (mut square, mut trend) = (0.0, 1.0);
-        for k in 0..FEATURES {
-            let step = (a[k] - b[k]) / self.lengths[k];
-            square += step * step;
-            trend += a[k] * b[k];
+    /// Covariances of a point with those of a block, in units of the variance.
+    fn kernel(&self, block: &[Lanes; FEATURES], at: &Scaled) -> Lanes {
+        let (mut square, mut trend) = ([0.0; LANES], [1.0; LANES]);
+        for ((a, b), length) in block.iter().zip(at).zip(&self.lengths) {
+            for lane in 0..LANES {
+                let step = (a[lane] - b) / length;
+                square[lane] += step * step;
+                trend[lane] += a[lane] * b;
+            }
         }
-        let distance = (5.0 * square).sqrt();
-        (1.0 + distance + distance * distance / 3.0) * libm::exp(-distance) + TREND_VARIANCE * trend
+        let distance = square.map(|square: f64| (5.0 * square).sqrt());
+        let decay = exp_of_negative(distance.map(|distance| -distance));
+        std::array::from_fn(|lane| {
+            let distance = distance[lane];
+            (1.0 + distance + distance * distance / 3.0) * decay[lane]
+                + TREND_VARIANCE * trend[lane]
+        })
     }
 
     /// Conditions the process on all points that are not practically known from others.
-    fn fit(&mut self, inputs: &[Features], values: &[f64]) {
-        self.factor = Cholesky::default();
-        self.used.clear();
+    fn fit(&mut self, inputs: &[Scaled], values: &[f64]) {
+        self.clear();
         for (k, input) in inputs.iter().enumerate() {
-            let row = self.row(inputs, input, NOISE);
+            let row = self.row(input, NOISE);
             if self.factor.push(&row, NEW_MIN) {
-                self.used.push(k);
+                self.add(k, input);
             }
         }
         let values: Vec<f64> = self.used.iter().map(|k| values[*k]).collect();
@@ -194,10 +250,24 @@ impl Process {
         }
     }
 
+    /// Forgets the points.
+    fn clear(&mut self) {
+        self.factor = Cholesky::default();
+        self.used.clear();
+        self.points = Points::default();
+    }
+
+    fn add(&mut self, number: usize, input: &Scaled) {
+        self.used.push(number);
+        self.points.push(input);
+    }
+
     /// Returns the covariances of a point with those used, and its variance.
-    fn row(&self, inputs: &[Features], at: &Features, noise: f64) -> Vec<f64> {
-        let mut row: Vec<f64> = self.used.iter().map(|k| self.kernel(&inputs[*k], at)).collect();
-        row.push(self.kernel(at, at) + noise);
+    fn row(&self, at: &Scaled, noise: f64) -> Vec<f64> {
+        let kernels = self.points.blocks.iter().flat_map(|block| self.kernel(block, at));
+        let mut row: Vec<f64> = kernels.take(self.points.count).collect();
+        let trend = at[..self.lengths.len()].iter().fold(1.0, |trend, x| trend + x * x);
+        row.push(1.0 + TREND_VARIANCE * trend + noise);
         row
     }
 
@@ -211,10 +281,10 @@ impl Process {
     }
 
     /// Chooses the lengths by coordinate search for the largest marginal likelihood.
-    fn choose_lengths(&mut self, inputs: &[Features], values: &[f64], scale: &Scale) {
+    fn choose_lengths(&mut self, inputs: &[Scaled], values: &[f64]) {
         let mut best = self.misfit(inputs, values);
         for factor in SWEEPS {
-            for k in (0..FEATURES).filter(|&k| scale.spread[k].is_finite()) {
+            for k in 0..self.lengths.len() {
                 let before = self.lengths[k];
                 for length in [before * factor, before / factor] {
                     self.lengths[k] = length.clamp(LENGTHS[0], LENGTHS[1]);
@@ -230,28 +300,33 @@ impl Process {
     }
 
     /// Returns minus the logarithm of the marginal likelihood, with the variance chosen best.
-    fn misfit(&mut self, inputs: &[Features], values: &[f64]) -> f64 {
-        self.factor = Cholesky::default();
-        self.used.clear();
+    fn misfit(&mut self, inputs: &[Scaled], values: &[f64]) -> f64 {
+        self.clear();
         for (k, input) in inputs.iter().enumerate() {
-            let row = self.row(inputs, input, NOISE_FOR_LENGTHS);
+            let row = self.row(input, NOISE_FOR_LENGTHS);
             if !self.factor.push(&row, 0.0) {
                 return f64::INFINITY;
             }
-            self.used.push(k);
+            self.add(k, input);
         }
         self.condition(values);
         0.5 * values.len() as f64 * libm::log(self.variance) + self.factor.half_log_determinant()
     }
 
-    fn mean(&self, inputs: &[Features], at: &Features) -> f64 {
-        let used = self.used.iter().zip(&self.weights);
-        let products = used.map(|(k, weight)| weight * self.kernel(&inputs[*k], at));
-        self.level + products.sum::<f64>()
+    fn mean(&self, at: &Scaled) -> f64 {
+        let mut sum = 0.0;
+        for (block, weights) in self.points.blocks.iter().zip(self.weights.chunks(LANES)) {
+            let kernel = self.kernel(block, at);
+            // One after another: the order of a sum is part of its result.
+            for (weight, kernel) in weights.iter().zip(kernel) {
+                sum += weight * kernel;
+            }
+        }
+        self.level + sum
     }
 
-    fn variance_at(&self, inputs: &[Features], at: &Features) -> f64 {
-        let row = self.row(inputs, at, 0.0);
+    fn variance_at(&self, at: &Scaled) -> f64 {
+        let row = self.row(at, 0.0);
         let Some((own, others)) = row.split_last() else { return 0.0 };
         let known = self.factor.solve_lower(others);
         self.variance * (own - dot(&known, &known)).max(0.0)
