@@ -1,4 +1,4 @@
-//! Coordinator, workers and store in one thread under a simulated clock. One seed decides order,
+//! Coordinator, workers and store of each schedule in one thread under a simulated clock. One seed decides order,
 //! delays, losses, stalls, answers that are late, missing, repeated, malformed or contradictory, a
 //! node whose workers are lost over everything they get, refusals, damage and long outages of the
 //! store, cancellations, speculative evaluations, pauses, clean stops and restarts of the
@@ -13,7 +13,9 @@
 mod fake;
 mod world;
 
-use std::panic;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::{panic, thread};
 
 use world::World;
 
@@ -27,16 +29,7 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
         Some(seed) => seed..seed + 1,
         None => 0..SCHEDULES,
     };
-    let mut seen = world::Counts::default();
-    for seed in seeds.clone() {
-        match panic::catch_unwind(|| World::run(seed)) {
-            Ok(counts) => seen.add(&counts),
-            Err(cause) => {
-                eprintln!("failed with OSTEON_SIMULATION_SEED={seed}");
-                panic::resume_unwind(cause);
-            }
-        }
-    }
+    let seen = run_all(seeds.clone());
     // A simulation in which nothing goes wrong would test nothing.
     if seeds.end - seeds.start == SCHEDULES {
         let world::Counts { lost, revoked, closed, late, restarts, refusals, checked, .. } = seen;
@@ -85,4 +78,39 @@ fn every_schedule_leaves_what_a_plain_loop_computes() {
         }
         println!("{seen:?}");
     }
+}
+
+/// Runs a schedule for each seed, on every processor: no schedule knows of another.
+fn run_all(seeds: Range<u64>) -> world::Counts {
+    let (next, failed) = (AtomicU64::new(seeds.start), AtomicBool::new(false));
+    let run_some = || {
+        let mut seen = world::Counts::default();
+        while !failed.load(Ordering::Relaxed) {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            if seed >= seeds.end {
+                break;
+            }
+            match panic::catch_unwind(|| World::run(seed)) {
+                Ok(counts) => seen.add(&counts),
+                Err(cause) => {
+                    failed.store(true, Ordering::Relaxed);
+                    eprintln!("failed with OSTEON_SIMULATION_SEED={seed}");
+                    panic::resume_unwind(cause);
+                }
+            }
+        }
+        seen
+    };
+    let mut seen = world::Counts::default();
+    let threads = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        let running: Vec<_> = (0..threads).map(|_| scope.spawn(run_some)).collect();
+        for thread in running {
+            match thread.join() {
+                Ok(counts) => seen.add(&counts),
+                Err(cause) => panic::resume_unwind(cause),
+            }
+        }
+    });
+    seen
 }
