@@ -42,6 +42,8 @@ const STEP: f64 = 1e-5;
 const LAWS: usize = 2;
 /// Points of the populations before the last one: enough to tell where the weights are.
 const LAW_POINTS: u64 = 1 << 14;
+/// Largest number of threads that draw a population.
+const THREADS_MAX: usize = 16;
 /// Power of the likelihood of widened populations.
 const WIDENED: f64 = 0.5;
 
@@ -146,11 +148,13 @@ impl PosteriorProblem {
     ) -> Population {
         let points = sobol_points(self.seed, u64::MAX - 1 - number, count);
         let branches = self.pivots.branches();
-        let members = points.iter().enumerate().flat_map(|(index, uniforms)| {
+        let members = in_parallel(&points, |index, uniforms| {
             let place = (law, index);
-            (0..branches).filter_map(move |branch| self.member(model, place, uniforms, branch))
+            (0..branches)
+                .filter_map(|branch| self.member(model, place, uniforms, branch))
+                .collect::<Vec<Member>>()
         });
-        Population::new(members.collect())
+        Population::new(members.into_iter().flatten().collect())
     }
 
     /// Returns the law about the weights of a population; `None` if these do not scatter.
@@ -362,6 +366,26 @@ impl Population {
         chosen.extend(last.into_iter().cycle().take(count - chosen.len()));
         chosen
     }
+}
+
+/// Returns what `compute` makes of each item and its place, in their order; several threads share the items,
+/// and none changes what another computes.
+fn in_parallel<T: Sync, R: Send>(items: &[T], compute: impl Fn(usize, &T) -> R + Sync) -> Vec<R> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(THREADS_MAX);
+    let share = items.len().div_ceil(threads).max(1);
+    let of_share = |(number, share_of): (usize, &[T])| -> Vec<R> {
+        let first = number * share;
+        share_of.iter().enumerate().map(|(k, item)| compute(first + k, item)).collect()
+    };
+    std::thread::scope(|scope| {
+        let shares: Vec<_> = items.chunks(share).enumerate().collect();
+        let handles: Vec<_> =
+            shares.into_iter().map(|share| scope.spawn(move || of_share(share))).collect();
+        let results = handles
+            .into_iter()
+            .map(|handle| handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        results.flatten().collect()
+    })
 }
 
 /// Returns the weights of these logarithms, with the sum 1.

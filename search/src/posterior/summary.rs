@@ -16,6 +16,8 @@ use super::population::{Member, Population, PosteriorProblem, closed_form, momen
 /// with more. The former are so many that quantiles, too, are exact to a thousandth of a standard
 /// deviation.
 const POINTS: [u64; 2] = [1 << 18, 1 << 14];
+/// Points of the population that tells how many draws count.
+const POINTS_COUNTED: u64 = 1 << 14;
 /// Points drawn from the prior for its standard deviations.
 const PRIOR_POINTS: u64 = 4096;
 /// Smallest number of effective draws of a result that counts as converged.
@@ -41,10 +43,11 @@ impl PosteriorSearch {
         let prior = problem.prior_points(PRIOR_POINTS);
         let of = |quantity: &dyn Fn(&Point) -> f64| summary(&population, &prior, quantity);
         let free: Vec<Parameter> = problem.priors.iter().map(|prior| prior.parameter).collect();
-        let (mean, variation) = (
-            of(&|point| self.moment(problem, point, 0)),
-            of(&|point| self.moment(problem, point, 1)),
-        );
+        let [mean, variation] = [0, 1].map(|axis| {
+            let values = population.members.iter().map(|member| libm::exp(member.moments[axis]));
+            let of_prior = prior.iter().map(|point| self.moment(problem, point, axis));
+            summary_of_values(&population, values.collect(), of_prior.collect())
+        });
         let at = [mean.mean, variation.mean].map(libm::log);
         let settings = specification.posterior.unwrap_or_default();
         let count = usize::try_from(settings.draws).unwrap_or(usize::MAX);
@@ -101,8 +104,12 @@ impl PosteriorSearch {
 
     /// Returns that too few draws count; `None` if they are enough.
     fn too_few_draws(&self, problem: &PosteriorProblem) -> Option<String> {
-        // Without the errors of the model, which make draws count more, and take long if large.
-        let effective = self.final_population(problem).effective() * self.check.efficiency();
+        // Without the errors of the model, which make draws count more, and take long if large. A part of
+        // the points tells as well how many of all count.
+        let all = Self::points(problem);
+        let drawn = all.min(POINTS_COUNTED);
+        let share = problem.population(&self.surrogate, drawn, self.populations).effective();
+        let effective = share * (all / drawn) as f64 * self.check.efficiency();
         (effective < EFFECTIVE_MIN).then(|| {
             format!(
                 "the draws count as {effective:.0} independent ones only, {EFFECTIVE_MIN} are \
@@ -113,8 +120,12 @@ impl PosteriorSearch {
 
     /// Returns the draws of the final interpolation.
     fn final_population(&self, problem: &PosteriorProblem) -> Population {
-        let points = POINTS[usize::from(!problem.is_of_few())];
-        problem.population(&self.surrogate, points, self.populations)
+        problem.population(&self.surrogate, Self::points(problem), self.populations)
+    }
+
+    /// Returns the number of Sobol' points of the final population.
+    fn points(problem: &PosteriorProblem) -> u64 {
+        POINTS[usize::from(!problem.is_of_few())]
     }
 }
 
@@ -165,9 +176,17 @@ fn summary(
     quantity: &dyn Fn(&Point) -> f64,
 ) -> PosteriorSummary {
     let values = population.members.iter().map(|member| quantity(&member.point)).collect();
-    let prior: Vec<f64> = prior.iter().map(quantity).collect();
-    let equal = vec![1.0 / prior.len() as f64; prior.len()];
-    let (_, prior_standard_deviation) = moments(&prior, &equal);
+    summary_of_values(population, values, prior.iter().map(quantity).collect())
+}
+
+/// Summarises a quantity of which these are the values at the population's points and at the prior's.
+fn summary_of_values(
+    population: &Population,
+    values: Vec<f64>,
+    of_prior: Vec<f64>,
+) -> PosteriorSummary {
+    let equal = vec![1.0 / of_prior.len() as f64; of_prior.len()];
+    let (_, prior_standard_deviation) = moments(&of_prior, &equal);
     PosteriorSummary { prior_standard_deviation, ..weighted(values, &population.weights) }
 }
 
@@ -229,15 +248,18 @@ fn entries(
     prior: &[Point],
     structure: &BoneStructure,
 ) -> Vec<(usize, usize, PosteriorSummary)> {
-    let entry = |point: &Point, row: usize, column: usize| {
+    let rows = |point: &Point| {
         let solid = structure.mean_solid(point);
-        solid.map_or(f64::NAN, |solid| solid.elasticity.rows()[row][column])
+        solid.map_or([[f64::NAN; 6]; 6], |solid| *solid.elasticity.rows())
     };
+    // A solid with pores takes long to compute, so each point's is computed once for all entries.
+    let drawn: Vec<_> = population.members.iter().map(|member| rows(&member.point)).collect();
+    let of_prior: Vec<_> = prior.iter().map(rows).collect();
     let places = (0..6).flat_map(|row| (row..6).map(move |column| (row, column)));
     places
         .map(|(row, column)| {
-            let of = |point: &Point| entry(point, row, column);
-            (row, column, summary(population, prior, &of))
+            let of = |solids: &[[[f64; 6]; 6]]| solids.iter().map(|one| one[row][column]).collect();
+            (row, column, summary_of_values(population, of(&drawn), of(&of_prior)))
         })
         .collect()
 }
