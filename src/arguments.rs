@@ -145,6 +145,9 @@ pub(crate) struct RunArguments {
     /// The live page.
     #[command(flatten)]
     pub(crate) page: RunPageOption,
+    /// Do not print what usual errors of the setup would move, where the job has no [systematic]
+    #[arg(long)]
+    pub(crate) no_budget: bool,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,

@@ -59,7 +59,7 @@ mod tests {
 
     /// Costs with this time of a realization at the start, s.
     fn cost(start_s: Option<f64>, realizations: u64) -> JobCost {
-        let point = Point([1.0; PARAMETERS]);
+        let point = Point::new([1.0; PARAMETERS]);
         let place = |mean_s| PlaceCost { point, mean_s, median_s: mean_s, measured: 8, failed: 0 };
         JobCost {
             start: start_s.map(place),

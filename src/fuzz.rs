@@ -27,8 +27,13 @@ fn check_result(json: &str) {
     let ended = bounded(json.len(), || ExitStatus::of_result(specification, &result));
     let cancelled = result_status::is_cancelled(&result);
     assert!(!cancelled || ended == ExitStatus::RunFailed);
-    let shown =
-        ShownResult { specification, result: &result, directory: None, detail: Detail::Usual };
+    let shown = ShownResult {
+        specification,
+        usual_shifts: &[],
+        result: &result,
+        directory: None,
+        detail: Detail::Usual,
+    };
     for format in [OutputFormat::Text, OutputFormat::Json] {
         let mut bytes = Vec::new();
         let mut output = output::to_writer(format, Box::new(&mut bytes));

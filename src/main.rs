@@ -31,6 +31,7 @@ mod signals;
 mod telemetry;
 mod unsearched_groups;
 mod user;
+mod usual_shifts;
 mod warnings;
 mod wings;
 

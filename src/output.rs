@@ -21,6 +21,7 @@ use osteon_solver::Isa;
 
 use crate::doctor::Diagnosis;
 use crate::resolved::OutputFormat;
+use crate::usual_shifts::UsualShift;
 
 pub(crate) use self::text::wrapped;
 pub(crate) use self::times::utc;
@@ -44,6 +45,8 @@ pub(crate) struct ShownResult<'a> {
     pub(crate) specification: &'a JobSpecification,
     /// The result.
     pub(crate) result: &'a ResultFile,
+    /// What usual errors of the setup would move, the largest first; empty if that is not shown.
+    pub(crate) usual_shifts: &'a [UsualShift],
     /// Directory of the result files, if they are kept.
     pub(crate) directory: Option<&'a Path>,
     /// How much of it is shown; programs always receive all.

@@ -36,6 +36,8 @@ pub(crate) struct Run {
     pub(crate) report: ReportOption,
     /// Address of its live page, if it has one.
     pub(crate) page: Option<SocketAddr>,
+    /// Whether a text says what usual errors of the setup would move.
+    pub(crate) budget: bool,
     /// Output format.
     pub(crate) format: OutputFormat,
     /// Format of the progress.
@@ -66,6 +68,7 @@ impl Run {
             out,
             report,
             page,
+            budget: !arguments.no_budget && !arguments.json,
             format: format(arguments.json),
             progress: arguments.progress,
             verbosity: arguments.verbosity,

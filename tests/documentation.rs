@@ -207,13 +207,14 @@ fn run_in(scratch: &Scratch, command: &str) {
 }
 
 /// The pages for users that show files and commands, with the least number of commands of each.
-const GUIDES: [(&str, usize); 12] = [
+const GUIDES: [(&str, usize); 13] = [
     ("docs/quick-start.md", 5),
     ("docs/tutorial.md", 3),
     ("docs/how-to-csv.md", 3),
     ("docs/how-to-observables.md", 2),
     ("docs/how-to-attenuation.md", 3),
     ("docs/how-to-porosity.md", 2),
+    ("docs/how-to-systematic.md", 2),
     ("docs/how-to-cluster.md", 2),
     ("docs/how-to-resume.md", 2),
     ("docs/how-to-posterior.md", 1),
@@ -268,6 +269,16 @@ fn check_guide(page: &str, scratch: &Scratch) {
         }
         "docs/how-to-reproduce.md" => {
             assert_eq!(json("original/result.json"), json("again/result.json"));
+        }
+        "docs/how-to-systematic.md" => {
+            let budget = &json("whole/result.json")["budget"][0];
+            assert_eq!(budget["quantity"], "bulk_velocity");
+            let parts = budget["contributions"].as_array().unwrap();
+            let shares = parts.iter().map(|part| part["variance_share"].as_f64().unwrap());
+            assert!((shares.sum::<f64>() - 1.0).abs() < 1e-9, "{budget}");
+            let sources = parts.iter().map(|part| part["source"].as_str().unwrap());
+            assert!(sources.clone().any(|name| name == "bone_quality_factor"), "{budget}");
+            assert!(!sources.clone().any(|name| name == "tilt"), "{budget}");
         }
         "docs/how-to-posterior.md" => {
             assert!(read("posterior/posterior.csv").lines().count() > 100);

@@ -152,7 +152,7 @@ impl Client {
                 Some(Part::History(block)) => {
                     for row in &block.rows {
                         let point = history::evaluation_from_message(row)?.point;
-                        points.insert(point.0.map(f64::to_bits));
+                        points.insert(point.bits());
                     }
                 }
                 _ => {}

@@ -57,7 +57,7 @@ impl AttainableMoments {
         let variation = |dispersion: f64, factor: f64| factor * dispersion / 14.0_f64.sqrt();
         // Quantities of the setup that are searched are held at their starts: within their bounds they
         // change the mean by less than MEAN_EXCESS_MAX.
-        let setup = Point(ranges.map(|range| range.start())).setup(setup);
+        let setup = Point::new(ranges.map(|range| range.start())).setup(setup);
         // Without a range of the velocities what random quantities add to their scatter has no bound.
         let scatter = match setup.structure.is_layered() && random.is_any() {
             true => f64::INFINITY,
@@ -298,7 +298,7 @@ fn largest_magnitude((from, to): (f64, f64)) -> f64 {
 
 /// Returns the point of fixed values and starts, but with this density, e_L, ν_L, e_T and ν_T.
 fn corner(ranges: &[Range; PARAMETERS], [density, e_l, nu_l, e_t, nu_t]: [f64; 5]) -> Point {
-    let mut point = Point(ranges.map(|range| range.start()));
+    let mut point = Point::new(ranges.map(|range| range.start()));
     for (parameter, value) in [
         (Parameter::Density, density),
         (Parameter::LongitudinalYoungModulus, e_l),

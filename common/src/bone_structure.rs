@@ -183,6 +183,21 @@ impl BoneStructure {
         self.porosity.or_else(|| self.profile.mean())
     }
 
+    /// Returns the porosity at the marrow's side less that at the skin's; `None` without pores, or where they
+    /// have no such sides: of a table, or of sublayers.
+    pub fn gradient(&self) -> Option<f64> {
+        let PorosityProfile { surface, marrow, .. } = self.profile;
+        self.porosity.map(|_| 0.0).or_else(|| Some(marrow? - surface?))
+    }
+
+    /// Changes the porosities at both sides to this difference, about the same mean.
+    pub fn set_gradient(&mut self, gradient: f64) {
+        let Some(mean) = self.mean_porosity() else { return };
+        self.porosity = None;
+        let half = 0.5 * gradient;
+        (self.profile.surface, self.profile.marrow) = (Some(mean - half), Some(mean + half));
+    }
+
     /// Returns the pores alone, with the porosities of a point where it has any.
     fn at(&self, point: &Point) -> Self {
         let searched = |parameter: Parameter, own: Option<f64>| {

@@ -17,6 +17,7 @@ mod range;
 mod section;
 mod setup;
 mod setup_parameters;
+mod systematic;
 mod value;
 
 use crate::job::JobSpecification;

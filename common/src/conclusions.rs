@@ -7,6 +7,7 @@ use crate::moments::Moments;
 use crate::observables::ObservableValues;
 use crate::parameters::{Parameter, Point};
 use crate::posterior::Posterior;
+use crate::systematic::SystematicQuantity;
 
 /// Conclusions from one set of data: the parameters that it determines, and the points that match
 /// it.
@@ -47,6 +48,68 @@ pub struct Inference {
     /// The free parameters themselves; their uncertainty is known only if no direction is left
     /// free.
     pub parameters: Vec<(Parameter, DerivedQuantity)>,
+    /// What makes the variances of the quantities that are known; empty if the job names nothing that is the
+    /// same for all data and not known exactly.
+    pub budget: Vec<QuantityBudget>,
+}
+
+/// The parts of the variance of a quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QuantityBudget {
+    /// The quantity.
+    pub quantity: BudgetQuantity,
+    /// The parts, which add up to 1.
+    pub contributions: Vec<Contribution>,
+}
+
+/// A quantity whose variance is told by its parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BudgetQuantity {
+    /// √(c1111/ρ).
+    BulkVelocity,
+    /// A free parameter.
+    Parameter(Parameter),
+}
+
+/// A part of a variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contribution {
+    /// Where it comes from.
+    pub source: BudgetSource,
+    /// Its part of the whole variance, 0 to 1.
+    pub variance_share: f64,
+}
+
+/// Where a part of a variance comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BudgetSource {
+    /// The noise of the data.
+    Data,
+    /// The finite number of realizations of the model.
+    Sampling,
+    /// Something that is the same for all data and not known exactly.
+    Systematic(SystematicQuantity),
+}
+
+impl BudgetQuantity {
+    /// Returns the name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BulkVelocity => "bulk_velocity",
+            Self::Parameter(parameter) => parameter.name(),
+        }
+    }
+}
+
+impl BudgetSource {
+    /// Returns the name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Data => "data",
+            Self::Sampling => "sampling",
+            Self::Systematic(source) => source.name(),
+        }
+    }
 }
 
 /// A direction of the box that the data determine.

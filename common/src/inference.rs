@@ -27,6 +27,7 @@ mod noise;
 mod profile;
 mod quantities;
 mod solutions;
+mod systematic;
 #[cfg(test)]
 mod tests;
 mod weights;
@@ -50,8 +51,9 @@ pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
 pub use self::weights::{MomentWeights, OBSERVED_PARTS_MIN};
 pub use crate::conclusions::{
-    Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors, Profile, Sensitivity,
-    Solution, Solutions, Spread, Spreads, Uncertainty,
+    BudgetQuantity, BudgetSource, Conclusions, Contribution, DerivedQuantity, Direction, Inference,
+    NoiseErrors, Profile, QuantityBudget, Sensitivity, Solution, Solutions, Spread, Spreads,
+    Uncertainty,
 };
 pub use crate::data_statistics::CONFIDENCE;
 
@@ -74,6 +76,8 @@ pub fn inference(
     let model = ComparedMoments::of_estimates(&estimate, &best.observables);
     let mut residual = model.differences(&data.compared(set)).map(|difference| -difference);
     let mut noise = noise(data, set, &estimate, &best.observables);
+    let effects = systematic::effects(specification, set, best, history);
+    noise.systematic = systematic::covariance(effects.as_ref().unwrap_or(&Vec::new()));
     let mut ends = LogarithmicEnds::of_data(data, set);
     if let Some(LikelihoodFit { residual: likely, covariance }) =
         by_likelihood(specification, set, best)
@@ -98,7 +102,12 @@ pub fn inference(
         quantile,
         residual,
         ends,
-        known: matched && !held && linear.undetermined.is_empty() && is_enough(&noise),
+        known: matched
+            && !held
+            && linear.undetermined.is_empty()
+            && is_enough(&noise)
+            && effects.is_some(),
+        effects: effects.as_ref(),
     };
     Some(Inference {
         matched,
@@ -110,6 +119,7 @@ pub fn inference(
         bulk_velocity: context.bulk_velocity(&jacobian.free)?,
         dispersion: context.dispersion(&jacobian.free),
         parameters: context.parameters(&jacobian.free),
+        budget: context.budget(&jacobian.free),
         noise: noise.errors(),
     })
 }

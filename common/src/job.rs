@@ -8,6 +8,7 @@ use crate::observables::ObservableSet;
 use crate::parameters::{self, AS_IN_SETUP, BONE_PARAMETERS, PARAMETERS, Parameter, Point};
 use crate::random_quantities::RandomQuantities;
 use crate::realization::{Ensemble, PointError};
+use crate::systematic::{Shift, Systematic, SystematicQuantity, Uncertain};
 
 pub use crate::data::{Data, Group, Measurements, NoVariation, VelocitySet};
 pub use crate::monte_carlo::{MonteCarlo, Sampling};
@@ -110,6 +111,8 @@ pub struct JobSpecification {
     pub parameters: [Range; PARAMETERS],
     /// Scatter of quantities of the setup.
     pub random: RandomQuantities,
+    /// What is the same for all data and not known exactly.
+    pub systematic: Systematic,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,
     /// The function to be minimised.
@@ -125,6 +128,8 @@ pub struct JobSpecification {
 pub struct RunSettings {
     /// Scatter of quantities of the setup.
     pub random: RandomQuantities,
+    /// What is the same for all data and not known exactly.
+    pub systematic: Systematic,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,
     /// The function to be minimised.
@@ -135,7 +140,7 @@ pub struct RunSettings {
 
 impl RunSettings {
     /// Returns each section with its key, in the order of a canonical file.
-    pub fn sections(&mut self) -> [(Key, &mut dyn Section); 4] {
+    pub fn sections(&mut self) -> [(Key, &mut dyn Section); 5] {
         [
             (
                 Key {
@@ -144,6 +149,7 @@ impl RunSettings {
                 },
                 &mut self.random,
             ),
+            (Systematic::KEY, &mut self.systematic),
             (
                 Key { name: "monte_carlo", meaning: "settings of the Monte Carlo loop" },
                 &mut self.monte_carlo,
@@ -176,8 +182,8 @@ fn has_known_noise(data: &Data) -> bool {
 impl JobSpecification {
     /// Returns the settings of the run.
     pub fn run_settings(&self) -> RunSettings {
-        let &Self { random, monte_carlo, objective, search, .. } = self;
-        RunSettings { random, monte_carlo, objective, search }
+        let &Self { random, systematic, monte_carlo, objective, search, .. } = self;
+        RunSettings { random, systematic, monte_carlo, objective, search }
     }
 
     /// Returns the observables that were measured, and that each realization must have therefore.
@@ -228,7 +234,7 @@ impl JobSpecification {
 
     /// Returns the point of fixed values and starts for set number `set` of the data.
     pub fn start_of(&self, set: usize) -> Point {
-        Point(self.ranges_of(set).map(|range| range.start()))
+        Point::new(self.ranges_of(set).map(|range| range.start()))
     }
 
     /// Returns the specification of the search for set number `set` of the data, without data.
@@ -267,11 +273,26 @@ impl JobSpecification {
             return 1;
         }
         let free = self.free().count() as u64;
-        let measured = if self.search.sensitivities && self.is_searched() { free } else { 0 };
+        let differences = free + self.shifts(&self.start().setup(&self.setup)).len() as u64;
+        let measured =
+            if self.search.sensitivities && self.is_searched() { differences } else { 0 };
         let sampled = self.posterior.map_or(0, |posterior| posterior.max_evaluations);
         let sets = self.data.as_ref().map_or(1, Data::searchable_count) as u64;
         let each = self.searched_max().saturating_add(measured).saturating_add(sampled);
         each.saturating_mul(sets)
+    }
+
+    /// Returns the quantities of this setup that are the same for all data and not known exactly.
+    pub fn uncertain(&self, setup: &Setup) -> Vec<Uncertain> {
+        let is_searched = |quantity: SystematicQuantity| {
+            self.free().any(|parameter| parameter.name() == quantity.name())
+        };
+        self.systematic.uncertain(setup, is_searched)
+    }
+
+    /// Returns the shifts of a setup by which the effects of what is not known exactly are measured.
+    pub fn shifts(&self, setup: &Setup) -> Vec<Shift> {
+        self.uncertain(setup).iter().flat_map(Uncertain::shifts).collect()
     }
 
     /// Returns the maximum number of evaluations of the searches of one set of data, from all
@@ -315,6 +336,6 @@ impl JobSpecification {
 
     /// Returns the point of fixed values and starts.
     pub fn start(&self) -> Point {
-        Point(self.parameters.map(|range| range.start()))
+        Point::new(self.parameters.map(|range| range.start()))
     }
 }

@@ -64,6 +64,7 @@ pub mod setup_quantity;
 mod sobol;
 pub mod special;
 pub mod statistics;
+pub mod systematic;
 pub mod version;
 pub mod violations;
 pub mod visible;

@@ -11,6 +11,7 @@ use crate::elasticity::EngineeringConstants;
 use crate::ensemble::DISPERSION_MAX;
 use crate::limits::QUALITY_FACTOR_MIN;
 use crate::plausible::{self, PlausibleRange};
+use crate::systematic::{Shift, SystematicQuantity};
 
 /// Number of all parameters.
 pub const PARAMETERS: usize = BONE_PARAMETERS + 6;
@@ -291,9 +292,13 @@ impl Parameter {
 }
 
 /// A point of the search space: the values of [`Parameter::ALL`], SI units, and [`AS_IN_SETUP`] for
-/// those of the setup that are not searched.
+/// those of the setup that are not searched; and a shift of a quantity of the setup, where what it moves is
+/// measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point(pub [f64; PARAMETERS]);
+pub struct Point(pub [f64; PARAMETERS], Option<Shift>);
+
+/// A point, to be compared and ordered to the bit.
+pub type PointBits = ([u64; PARAMETERS], Option<(SystematicQuantity, u64)>);
 
 /// Extends values of [`Parameter::OF_BONE`] to all parameters, by the same value for all others.
 pub const fn extended<T: Copy>(of_bone: [T; BONE_PARAMETERS], others: T) -> [T; PARAMETERS] {
@@ -314,9 +319,31 @@ impl fmt::Display for Point {
 }
 
 impl Point {
+    /// Creates a point of these values of [`Parameter::ALL`].
+    pub const fn new(values: [f64; PARAMETERS]) -> Self {
+        Self(values, None)
+    }
+
+    /// Returns the point with this shift, or with none.
+    #[must_use]
+    pub const fn shifted(self, shift: Option<Shift>) -> Self {
+        Self(self.0, shift)
+    }
+
+    /// Returns the shift of a quantity of the setup, if it has one.
+    pub const fn shift(&self) -> Option<Shift> {
+        self.1
+    }
+
+    /// Returns all that makes it this point, to the bit: its values and its shift.
+    pub fn bits(&self) -> PointBits {
+        let shift = self.1.map(|Shift { quantity, value }| (quantity, value.to_bits()));
+        (self.0.map(f64::to_bits), shift)
+    }
+
     /// Creates a point (a, δ) for the values of the setup.
     pub const fn of_bone(values: [f64; BONE_PARAMETERS]) -> Self {
-        Self(extended(values, AS_IN_SETUP))
+        Self::new(extended(values, AS_IN_SETUP))
     }
 
     /// Returns the parameters that the point has, with their values: all of the bone, and those of the

@@ -106,6 +106,8 @@ pub struct EvaluationRole {
     /// The parameter in which it differs from the best point, to measure a derivative; `None` for
     /// other evaluations.
     pub varied: Option<Parameter>,
+    /// Whether it measures what a quantity of the setup moves, by which the point is shifted.
+    pub shifted: bool,
     /// Whether it serves the posterior.
     pub posterior: bool,
 }
@@ -113,7 +115,12 @@ pub struct EvaluationRole {
 impl EvaluationRole {
     /// Returns whether it is an evaluation of the search itself.
     pub fn is_of_search(&self) -> bool {
-        self.varied.is_none() && !self.posterior
+        !self.is_beside_best() && !self.posterior
+    }
+
+    /// Returns whether it only measures what a change moves from the best point.
+    pub fn is_beside_best(&self) -> bool {
+        self.varied.is_some() || self.shifted
     }
 }
 

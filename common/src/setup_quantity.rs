@@ -2,6 +2,7 @@
 
 use crate::case::Setup;
 use crate::parameters::{Parameter, Point};
+use crate::systematic::Shift;
 
 /// Number of germs of a realization's setup ([`crate::random_quantities`]). They follow those of the
 /// elasticity, which are the same with and without them.
@@ -148,6 +149,10 @@ impl Point {
             Some(quantity) => quantity.with(value, setup),
             None => setup,
         };
-        self.given().fold(setup.clone(), with)
+        let searched = self.given().fold(setup.clone(), with);
+        match self.shift() {
+            Some(Shift { quantity, value }) => quantity.with(value, searched),
+            None => searched,
+        }
     }
 }

@@ -15,12 +15,13 @@ use std::path::{Path, PathBuf};
 use osteon_common::bone_structure::BoneStructure;
 use osteon_common::case::Setup;
 use osteon_common::check;
+use osteon_common::fields::Section;
 use osteon_common::job::{
     JobKind, JobSpecification, MonteCarlo, Objective, Omitted, PosteriorSettings, Search,
 };
 use osteon_common::limits;
 use osteon_common::pulse::PulseForm;
-use osteon_common::random_quantities::RandomQuantities;
+use osteon_common::systematic::Systematic;
 use osteon_common::warnings::{self, Warning};
 
 use crate::document::{Format, Node};
@@ -143,6 +144,7 @@ fn of_tree(
         "data",
         "parameters",
         "random",
+        Systematic::KEY.name,
         "monte_carlo",
         "objective",
         "search",
@@ -164,7 +166,8 @@ fn of_tree(
         setup: setup.clone(),
         data,
         parameters: parameters::read(&mut reader, &table, &setup),
-        random: random(&mut reader, &table),
+        random: section(&mut reader, &table, "random"),
+        systematic: section(&mut reader, &table, Systematic::KEY.name),
         monte_carlo: monte_carlo(&mut reader, &table),
         objective,
         search,
@@ -202,10 +205,10 @@ pub(crate) fn setup(reader: &mut Reader, root: &Table<'_>, directory: &Path) -> 
     setup
 }
 
-fn random(reader: &mut Reader, root: &Table<'_>) -> RandomQuantities {
-    let mut random = RandomQuantities::default();
-    reader::section(reader, root, "random", &mut random);
-    random
+fn section<S: Section + Default>(reader: &mut Reader, root: &Table<'_>, name: &str) -> S {
+    let mut read = S::default();
+    reader::section(reader, root, name, &mut read);
+    read
 }
 
 fn monte_carlo(reader: &mut Reader, root: &Table<'_>) -> MonteCarlo {

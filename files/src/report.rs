@@ -25,7 +25,8 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
 pub use self::conclusions::{
-    Direction, Identified, Noise, ParameterProfile, QuantityEstimate, Solution, Solutions, Spreads,
+    Contribution, Direction, Identified, Noise, ParameterProfile, QuantityBudget, QuantityEstimate,
+    Solution, Solutions, Spreads,
 };
 pub use self::error::{BestPointError, ReadError, listed};
 pub use self::identification::{Group, Identification, SearchSettings};

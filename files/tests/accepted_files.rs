@@ -25,6 +25,7 @@ use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::pulse::PulseForm;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
+use osteon_common::systematic::Systematic;
 use osteon_files::document::Format;
 use osteon_files::{case_file, job_file, materials};
 
@@ -114,6 +115,7 @@ fn a_minimal_job_has_the_documented_defaults() {
             Range::Free { start: 0.1, lower: 0.02, upper: 0.3 },
         ]),
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo {
             realizations: 2747,
             seed: 1,

@@ -26,6 +26,8 @@ mod probe;
 mod random;
 #[path = "rejected_jobs/setup_parameters.rs"]
 mod setup_parameters;
+#[path = "rejected_jobs/systematic.rs"]
+mod systematic;
 
 const JOB: &str = include_str!("files/job.toml");
 /// The line of the bone in `files/job.toml`.

@@ -28,6 +28,7 @@ use osteon_common::probe::{Probe, Receivers, Source};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
 use osteon_common::setup_quantity::SetupQuantity;
+use osteon_common::systematic::{Systematic, SystematicLaw, SystematicQuantity};
 use osteon_files::document::Format;
 use osteon_files::file_error::ContentError;
 use osteon_files::{case_file, job_file};
@@ -337,12 +338,15 @@ fn job() -> impl Strategy<Value = JobSpecification> {
             let searched = has_law && search.method == SearchMethod::Simplex;
             let objective = if searched { objective } else { Objective::Moments };
             let posterior = around_starts(posterior, &parameters).filter(|_| identification);
+            let allowed = identification && search.sensitivities && !has_posterior;
+            let systematic = uncertain_offset(allowed, monte_carlo.max_failed_fraction);
             let job = JobSpecification {
                 kind: KINDS[usize::from(!identification)],
                 setup,
                 data: identification.then_some(data),
                 parameters,
                 random,
+                systematic,
                 monte_carlo,
                 objective,
                 search,
@@ -351,6 +355,17 @@ fn job() -> impl Strategy<Value = JobSpecification> {
             job.with_implied(Omitted::default())
         },
     )
+}
+
+/// Returns an uncertain offset of the velocities, where the job allows any.
+fn uncertain_offset(allowed: bool, spread: f64) -> Systematic {
+    let mut systematic = Systematic::default();
+    if allowed {
+        let distribution = RandomDistribution::Uniform;
+        systematic.laws[SystematicQuantity::VelocityOffset as usize] =
+            SystematicLaw { spread: Some(spread), distribution, center: Some(0.0) };
+    }
+    systematic
 }
 
 /// A number of a specification, replaced by another.

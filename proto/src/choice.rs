@@ -4,6 +4,7 @@ use osteon_common::job::{JobKind, Objective, PriorDistribution, Sampling};
 use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
 use osteon_common::results::{JobFailure, Status};
+use osteon_common::systematic::SystematicQuantity;
 
 use crate::malformed::Malformed;
 use crate::v1;
@@ -118,6 +119,27 @@ pub static PARAMETER: EnumMapping<Parameter, v1::Parameter> = EnumMapping {
     },
     name: v1::Parameter::as_str_name,
 };
+
+/// A quantity of the setup that is not known exactly.
+pub(crate) static SYSTEMATIC_QUANTITY: EnumMapping<SystematicQuantity, v1::SystematicQuantity> =
+    EnumMapping {
+        all: &SystematicQuantity::ALL,
+        message: |quantity| match quantity {
+            SystematicQuantity::BoneThickness => v1::SystematicQuantity::BoneThickness,
+            SystematicQuantity::BoneQualityFactor => v1::SystematicQuantity::BoneQualityFactor,
+            SystematicQuantity::CouplingSoundSpeed => v1::SystematicQuantity::CouplingSoundSpeed,
+            SystematicQuantity::MarrowSoundSpeed => v1::SystematicQuantity::MarrowSoundSpeed,
+            SystematicQuantity::SourceHeight => v1::SystematicQuantity::SourceHeight,
+            SystematicQuantity::ReceiverHeight => v1::SystematicQuantity::ReceiverHeight,
+            SystematicQuantity::FirstReceiver => v1::SystematicQuantity::FirstReceiver,
+            SystematicQuantity::Pitch => v1::SystematicQuantity::Pitch,
+            SystematicQuantity::CenterFrequency => v1::SystematicQuantity::CenterFrequency,
+            SystematicQuantity::Tilt => v1::SystematicQuantity::Tilt,
+            SystematicQuantity::PorosityGradient => v1::SystematicQuantity::PorosityGradient,
+            SystematicQuantity::VelocityOffset => v1::SystematicQuantity::VelocityOffset,
+        },
+        name: v1::SystematicQuantity::as_str_name,
+    };
 
 /// Reason why a realization has no velocity.
 pub static FAILURE_KIND: EnumMapping<FailureKind, v1::FailureKind> = EnumMapping {

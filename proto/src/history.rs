@@ -56,11 +56,13 @@ pub fn evaluation_to_message(evaluation: &Evaluation) -> v1::EvaluationRow {
 pub fn evaluation_from_message(message: &v1::EvaluationRow) -> Result<Evaluation, Malformed> {
     let varied = message.varied.map(|number| PARAMETER.required(number, "varied")).transpose()?;
     let &v1::EvaluationRow { group, start, posterior, .. } = message;
-    let role = EvaluationRole { group, start, varied, posterior };
+    let point = point_from_message(message.point.as_ref())?;
+    let shifted = point.shift().is_some();
+    let role = EvaluationRole { group, start, varied, shifted, posterior };
     Ok(Evaluation {
         number: message.number,
         role,
-        point: point_from_message(message.point.as_ref())?,
+        point,
         moments: message.moments.as_ref().map(moments_from_message),
         observables: means_from_messages(&message.observables)?,
         cost: message.cost,

@@ -1,7 +1,9 @@
 //! A number for each parameter as a message.
 
 use osteon_common::parameters::{AS_IN_SETUP, PARAMETERS, Parameter, Point};
+use osteon_common::systematic::Shift;
 
+use crate::choice::SYSTEMATIC_QUANTITY;
 use crate::malformed::Malformed;
 use crate::v1;
 
@@ -11,6 +13,10 @@ pub fn point_to_message(point: &Point) -> v1::ParameterValues {
     for (parameter, value) in point.given() {
         *slot(&mut message, parameter) = Some(value);
     }
+    message.shift = point.shift().map(|Shift { quantity, value }| v1::Shift {
+        quantity: SYSTEMATIC_QUANTITY.number(quantity),
+        value,
+    });
     message
 }
 
@@ -21,7 +27,7 @@ pub fn point_to_message(point: &Point) -> v1::ParameterValues {
 /// not above 0.
 pub fn point_from_message(message: Option<&v1::ParameterValues>) -> Result<Point, Malformed> {
     let message = message.ok_or(Malformed::Missing { field: "point" })?;
-    let mut point = Point([AS_IN_SETUP; PARAMETERS]);
+    let mut point = Point::new([AS_IN_SETUP; PARAMETERS]);
     for (slot, parameter) in point.0.iter_mut().zip(Parameter::ALL) {
         let (field, of_setup) = (parameter.name(), parameter.of_setup().is_some());
         let value = match get(message, parameter) {
@@ -38,7 +44,18 @@ pub fn point_from_message(message: Option<&v1::ParameterValues>) -> Result<Point
         }
         *slot = value;
     }
-    Ok(point)
+    let shift = message.shift.as_ref().map(shift_from_message).transpose()?;
+    Ok(point.shifted(shift))
+}
+
+fn shift_from_message(message: &v1::Shift) -> Result<Shift, Malformed> {
+    let quantity = SYSTEMATIC_QUANTITY.required(message.quantity, "shift.quantity")?;
+    let value = message.value;
+    if !value.is_finite() {
+        let allowed = "it must be finite";
+        return Err(Malformed::OutOfRange { field: "shift.value", value, allowed });
+    }
+    Ok(Shift { quantity, value })
 }
 
 fn get(message: &v1::ParameterValues, parameter: Parameter) -> Option<f64> {

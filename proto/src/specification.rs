@@ -12,6 +12,7 @@ use osteon_common::observables::ObservedColumns;
 use osteon_common::parameters::{PARAMETERS, Parameter, Point};
 use osteon_common::porosity::BoneMatrix;
 use osteon_common::random_quantities::RandomQuantities;
+use osteon_common::systematic::Systematic;
 use osteon_common::violations::Violations;
 
 use crate::choice::{JOB_KIND, PARAMETER};
@@ -35,6 +36,8 @@ pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
         data: specification.data.as_ref().map(data_to_message),
         parameters: Some(parameters_to_message(&specification.parameters)),
         random: random_to_message(&specification.random),
+        systematic: (!specification.systematic.is_empty())
+            .then(|| fields::to_message(&mut specification.systematic.clone())),
         monte_carlo: Some(fields::to_message(&mut specification.monte_carlo.clone())),
         objective: Some(fields::to_message(&mut specification.objective.clone())),
         search: Some(search_to_message(&specification.search)),
@@ -75,6 +78,10 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
         JobKind::Identification
     });
     let (mut monte_carlo, mut objective) = (MonteCarlo::default(), Objective::default());
+    let mut systematic = Systematic::default();
+    if let Some(message) = &message.systematic {
+        fields::from_message("systematic", message, &mut systematic, violations);
+    }
     let random = message.random.as_ref();
     let random = random
         .map_or_else(RandomQuantities::default, |message| random_from_message(message, violations));
@@ -102,6 +109,7 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
         ),
         setup,
         random,
+        systematic,
         monte_carlo,
         objective,
         search: message

@@ -56,6 +56,7 @@ class Job:
         bone: pores or sublayers of the bone: with a porosity, `parameters` are those of the bone between the
             pores.
         random: scatter of quantities of the setup.
+        systematic: what is the same for all data and not known exactly.
         monte_carlo: number of realizations, seed, sampling.
         objective: the function to be minimised.
         search: method and its settings.
@@ -81,6 +82,7 @@ class Job:
         solver: sections.Solver | Mapping[str, Any] | None = None,
         bone: sections.Bone | Mapping[str, Any] | None = None,
         random: sections.Random | Mapping[str, Any] | None = None,
+        systematic: sections.Systematic | Mapping[str, Any] | None = None,
         monte_carlo: sections.MonteCarlo | Mapping[str, Any] | None = None,
         objective: sections.Objective | Mapping[str, Any] | None = None,
         search: sections.Search | Mapping[str, Any] | None = None,
@@ -94,6 +96,7 @@ class Job:
             "bone": bone,
             "parameters": parameters,
             "random": random,
+            "systematic": systematic,
             "monte_carlo": monte_carlo,
             "objective": objective,
             "search": search,

@@ -78,6 +78,7 @@ mod tests {
     use osteon_common::case::Setup;
     use osteon_common::job::{Group, MonteCarlo, Objective, PosteriorSettings, Range, Search};
     use osteon_common::random_quantities::RandomQuantities;
+    use osteon_common::systematic::Systematic;
 
     use super::*;
 
@@ -91,6 +92,7 @@ mod tests {
             data: Some(Data::from_moments(3900.0, 0.027)),
             parameters: Range::of_bone(free),
             random: RandomQuantities::default(),
+            systematic: Systematic::default(),
             monte_carlo: MonteCarlo::default(),
             objective: Objective::Moments,
             search: Search::by(method),

@@ -57,7 +57,7 @@ pub(crate) fn posterior(
     history: &[Evaluation],
 ) -> Option<Posterior> {
     specification.posterior?;
-    let rows = || history.iter().filter(|row| row.belongs_to(set) && row.role.varied.is_none());
+    let rows = || history.iter().filter(|row| row.belongs_to(set) && !row.role.is_beside_best());
     let known = rows()
         .filter(|row| !row.role.posterior)
         .filter_map(|row| Some((row.point, feasible_moments(row)?)));

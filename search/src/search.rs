@@ -158,7 +158,7 @@ impl Search {
             Step::Evaluate(point) => Some(point),
             Step::Done(_) => None,
         };
-        if expected.map(|at| at.0.map(f64::to_bits)) == Some(point.0.map(f64::to_bits)) {
+        if expected.map(|at| at.bits()) == Some(point.bits()) {
             return Ok(());
         }
         Err(ReplayError {
@@ -205,8 +205,8 @@ impl Search {
                 self.outcomes = Some(outcomes);
             }
         }
-        // Points that only measure a derivative are not part of the path.
-        if row.role.varied.is_none() {
+        // Points that only measure what a change moves are not part of the path.
+        if !row.role.is_beside_best() {
             self.digest.add(&point, &assessed);
         }
         self.history.push(row);

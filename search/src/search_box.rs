@@ -79,7 +79,7 @@ impl SearchBox {
     /// its start.
     pub fn point(&self, at: &[f64]) -> Point {
         let mut at = at.iter();
-        Point(self.ranges.map(|range| match range {
+        Point::new(self.ranges.map(|range| match range {
             Range::Fixed(value) => value,
             Range::Free { start, lower, upper } => match at.next() {
                 Some(u) if Some(*u) != unit_start(&range) => {

@@ -13,7 +13,7 @@ use osteon_common::job::{JobKind, JobSpecification};
 use osteon_common::results::Status;
 use osteon_coordinator::service::open_files;
 use osteon_files::job_file;
-use osteon_files::report::ResultFile;
+use osteon_files::report::{Identification, ResultFile};
 use osteon_proto::v1::JobSnapshot;
 use osteon_solver::Isa;
 
@@ -26,6 +26,7 @@ use crate::progress::{Progress, ShownProgress, say};
 use crate::resolved::Run;
 use crate::signals;
 use crate::user;
+use crate::usual_shifts::{UsualShift, usual_shifts};
 use crate::{cost, program, unsearched_groups, warnings};
 
 /// Prepares an identification.
@@ -177,10 +178,30 @@ fn show(run: &Run, specification: &JobSpecification, result: &ResultFile) -> End
         VerbosityArguments { verbose: true, .. } => Detail::Full,
         VerbosityArguments { .. } => Detail::Usual,
     };
-    let shown = ShownResult { specification, result, directory: run.out.as_deref(), detail };
+    let usual_shifts = match result {
+        ResultFile::Identification(found) if run.budget => shifts(specification, found)?,
+        _ => Vec::new(),
+    };
+    let directory = run.out.as_deref();
+    let shown =
+        ShownResult { specification, result, usual_shifts: &usual_shifts, directory, detail };
     output::stdout(run.format).result(&shown).map_err(stdout_failure)?;
     run.report.write(run.out.as_deref())?;
     Ok(ExitStatus::of_result(specification, result))
+}
+
+/// Returns what usual errors of the setup would move at the best point; nothing if the job says how well the
+/// setup is known, or has groups, whose table has no room for it.
+fn shifts(
+    specification: &JobSpecification,
+    found: &Identification,
+) -> Result<Vec<UsualShift>, CommandFailure> {
+    let point = found.cost.and_then(|_| found.parameters.point(found.dispersion));
+    let is_said = !specification.systematic.is_empty() || found.groups.is_some();
+    match point.filter(|_| !is_said) {
+        Some(point) => Ok(usual_shifts(specification, &point, ProcessContext::isa()?)),
+        None => Ok(Vec::new()),
+    }
 }
 
 /// Runs the job at a place until it has ended or the user interrupts it.

@@ -80,6 +80,7 @@ fn shown(kind: JobKind, free: &[&str], json: &str) -> String {
     };
     let shown = ShownResult {
         specification: &specification,
+        usual_shifts: &[],
         result: &result,
         directory,
         detail: Detail::Usual,
@@ -117,6 +118,7 @@ fn a_search_for_the_nearest_point_says_so() {
         let result = &identification(json);
         let shown = ShownResult {
             specification: &specification,
+            usual_shifts: &[],
             result,
             directory: None,
             detail: Detail::Usual,
@@ -149,6 +151,7 @@ fn a_likelihood_is_shown_with_its_error_and_what_the_data_say() {
     let result = &identification(&detailed());
     let shown = ShownResult {
         specification: &specification,
+        usual_shifts: &[],
         result,
         directory: None,
         detail: Detail::Usual,
@@ -372,6 +375,7 @@ fn json_is_what_stands_in_the_file() {
     let result = &identification(file);
     let shown = ShownResult {
         specification: &specification,
+        usual_shifts: &[],
         result,
         directory: None,
         detail: Detail::Usual,

@@ -14,6 +14,7 @@ mod observations;
 pub(super) mod operators;
 mod posterior;
 mod result;
+mod set_up;
 mod simulation;
 mod solver;
 

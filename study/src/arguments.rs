@@ -52,6 +52,9 @@ pub(crate) enum Study {
     Porosities(TwinsArguments),
     /// Count them for posteriors of a porosity that changes through the thickness, both ends free
     PorosityProfiles(TwinsArguments),
+    /// Count how many confidence intervals contain the true value where the data are of another setup than the
+    /// job's, with and without `[systematic] usual = true`
+    SetupErrors(TwinsArguments),
     /// Identify one porosity from bones whose porosity changes through the thickness
     UnmodelledProfiles(TwinsArguments),
     /// Count how many intervals of posteriors contain the true value, over parameter sets drawn from

@@ -6,7 +6,7 @@ use std::convert::Infallible;
 use osteon_common::case::Setup;
 use osteon_common::job::{JobSpecification, MonteCarlo};
 use osteon_common::outcome::{Outcome, RealizationResult};
-use osteon_common::parameters::{PARAMETERS, Point};
+use osteon_common::parameters::{Point, PointBits};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::realization::{Ensemble, PointError};
 use osteon_search::{CompletedJob, IdentifyError};
@@ -16,7 +16,7 @@ use crate::draws::solve_realizations;
 
 /// Cache of the realizations at the points at which several identifications begin, by the bits of
 /// the point.
-pub(crate) type RealizationCache = BTreeMap<[u64; PARAMETERS], Vec<RealizationResult>>;
+pub(crate) type RealizationCache = BTreeMap<PointBits, Vec<RealizationResult>>;
 
 /// Layers and probe, and how they differ from realization to realization.
 #[derive(Debug, Clone, Default)]
@@ -95,7 +95,7 @@ pub(crate) fn identify(
     let mut solver = Solver::with_isa(&specification.setup, isa);
     let mut begun = false;
     osteon_search::identify(specification, |realizations| {
-        let bits = realizations.point.0.map(f64::to_bits);
+        let bits = realizations.point.bits();
         let is_first = !std::mem::replace(&mut begun, true);
         if let Some(found) = known.get(&bits) {
             return Ok(found.clone());

@@ -22,6 +22,7 @@ pub mod porosities;
 pub mod posteriors;
 pub mod refinement;
 pub mod searches;
+pub mod setup_errors;
 pub mod setups;
 mod spread;
 mod table;

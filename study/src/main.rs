@@ -18,7 +18,7 @@ use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, digest,
-    failures, methods, models, porosities, refinement, searches, setups, variance,
+    failures, methods, models, porosities, refinement, searches, setup_errors, setups, variance,
 };
 
 use crate::arguments::{
@@ -82,6 +82,11 @@ const POROSITY_PROFILES: OverTwins = OverTwins {
     repetitions: porosities::PROFILES,
     table: porosities::profiles,
 };
+const SETUP_ERRORS: OverTwins = OverTwins {
+    name: "setup-errors",
+    repetitions: setup_errors::BONES,
+    table: setup_errors::coverage,
+};
 const UNMODELLED_PROFILES: OverTwins =
     OverTwins { name: "unmodelled-profiles", repetitions: 1, table: porosities::unmodelled };
 
@@ -131,6 +136,7 @@ fn run_study(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::Populations(arguments) => run_over_twins(&POPULATIONS, arguments, isa),
         Study::Porosities(arguments) => run_over_twins(&POROSITIES, arguments, isa),
         Study::PorosityProfiles(arguments) => run_over_twins(&POROSITY_PROFILES, arguments, isa),
+        Study::SetupErrors(arguments) => run_over_twins(&SETUP_ERRORS, arguments, isa),
         Study::UnmodelledProfiles(arguments) => {
             run_over_twins(&UNMODELLED_PROFILES, arguments, isa)
         }

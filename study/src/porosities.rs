@@ -14,6 +14,7 @@ use osteon_common::porosity::BoneMatrix;
 use osteon_common::posterior::Posterior;
 use osteon_common::quantile::quantile;
 use osteon_common::random_quantities::RandomQuantities;
+use osteon_common::systematic::Systematic;
 use rayon::prelude::*;
 
 use crate::generator::Generator;
@@ -338,6 +339,7 @@ fn specification(
         data: Some(Data::from_velocities(velocities)),
         parameters,
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo {
             realizations,
             seed,

@@ -19,6 +19,7 @@ use osteon_common::parameters::{BONE_PARAMETERS, Parameter, Point};
 use osteon_common::posterior::{Posterior, PosteriorSummary};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::statistics::PointStatistics;
+use osteon_common::systematic::Systematic;
 use rayon::prelude::*;
 
 pub use self::calibration::{PosteriorCalibration, Scenario};
@@ -217,6 +218,7 @@ fn specification(data: Data, monte_carlo: MonteCarlo) -> JobSpecification {
         data: Some(data),
         parameters: Range::of_bone(BOUNDS.map(range)),
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo,
         objective: Objective::default(),
         search: Search::by(SearchMethod::Posterior),

@@ -12,6 +12,7 @@ use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::realization::PointError;
 use osteon_common::results::{Moments, Status};
 use osteon_common::statistics;
+use osteon_common::systematic::Systematic;
 use osteon_search::{CompletedJob, IdentifyError, newton};
 
 use crate::draws::{Draws, OPTIMUM};
@@ -128,6 +129,7 @@ fn run_search(
             Range::Free { start: start.0[i], lower, upper }
         })),
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: monte_carlo(draws),
         objective: Objective::default(),
         search,

@@ -11,6 +11,7 @@ use osteon_common::job::{
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::realization::PointError;
+use osteon_common::systematic::Systematic;
 use osteon_search::IdentifyError;
 use osteon_solver::Isa;
 
@@ -299,6 +300,7 @@ fn specification(
         data: Some(Data::from_velocities(velocities)),
         parameters: Parameter::ALL.map(range),
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo {
             realizations: REALIZATIONS,
             seed,

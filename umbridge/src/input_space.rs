@@ -2,6 +2,7 @@
 
 use osteon_common::job::{JobKind, JobSpecification, Objective, Range, Search};
 use osteon_common::parameters::{AS_IN_SETUP, Parameter, Point};
+use osteon_common::systematic::Systematic;
 use osteon_common::violations::Violations;
 
 use super::protocol_error::ProtocolError;
@@ -145,6 +146,7 @@ impl<'a> InputSpace<'a> {
             data: None,
             parameters,
             random: self.specification.random,
+            systematic: Systematic::default(),
             monte_carlo,
             objective: Objective::Moments,
             search: Search::default(),
@@ -184,6 +186,7 @@ pub(super) mod tests {
     use osteon_common::case::Setup;
     use osteon_common::job::MonteCarlo;
     use osteon_common::random_quantities::RandomQuantities;
+    use osteon_common::systematic::Systematic;
 
     use super::*;
 
@@ -198,6 +201,7 @@ pub(super) mod tests {
             data: None,
             parameters,
             random: RandomQuantities::default(),
+            systematic: Systematic::default(),
             monte_carlo: MonteCarlo::default(),
             objective: Objective::Moments,
             search: Search::default(),

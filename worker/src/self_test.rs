@@ -4,6 +4,7 @@ use osteon_common::case::Setup;
 use osteon_common::digest::PathDigest;
 use osteon_common::job::{JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::random_quantities::RandomQuantities;
+use osteon_common::systematic::Systematic;
 use osteon_solver::{Isa, Solver, Workspace};
 
 /// Number of realizations of the batch.
@@ -37,6 +38,7 @@ fn specification() -> JobSpecification {
             [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029].map(Range::Fixed),
         ),
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo { realizations: REALIZATIONS, seed: 1, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: Search::default(),

@@ -19,7 +19,9 @@ use super::priors::priors;
 use super::range::range;
 use super::section::section;
 use super::setup::setup;
+
 use super::setup_parameters::{random_setup, setup_parameters};
+use super::systematic::systematic;
 use super::value::known_wrong;
 
 /// Records all violations of `specification`.
@@ -68,6 +70,7 @@ pub fn job_from(
     chi_square(specification, violations);
     observables_of_job(specification, origin, violations);
     posterior_of_job(specification, violations);
+    systematic(specification, violations);
     within_reach(specification, violations);
 }
 

@@ -26,10 +26,7 @@ pub fn jacobian(
     best: &BestPoint,
     history: &[Evaluation],
 ) -> Option<Jacobian> {
-    let base = best.velocity?.moments;
-    let means = best.observables.map(|found| found.map(|found| found.mean));
-    let of_data = specification.data.as_ref()?.compared(set).observables;
-    let observables = of_data.which();
+    let observables = specification.data.as_ref()?.compared(set).observables.which();
     let mut jacobian = Jacobian { free: Vec::new(), columns: Vec::new(), observables };
     for parameter in Parameter::ALL {
         let range = specification.range(parameter);
@@ -40,14 +37,7 @@ pub fn jacobian(
         let row = history.iter().find(varied)?;
         let at = |point: &Point| range.coordinate(point.get(parameter));
         let step = at(&row.point)? - at(&best.point)?;
-        let changes = moment_vector(log_ratios(row.moments?, base), |one| match of_data[one] {
-            Some(measured) => {
-                let [found, base] = [row.observables[one], means[one]];
-                found.zip(base).map_or(f64::NAN, |(found, base)| (found - base) / measured)
-            }
-            None => 0.0,
-        });
-        let column = changes.map(|change| change / step);
+        let column = changes(specification, set, best, row)?.map(|change| change / step);
         if !column.iter().all(|slope| slope.is_finite()) {
             return None;
         }
@@ -55,6 +45,26 @@ pub fn jacobian(
         jacobian.columns.push(column);
     }
     (!jacobian.free.is_empty()).then_some(jacobian)
+}
+
+/// Returns the changes of the compared moments from the best point to an evaluation on the same germs; `None`
+/// without moments. An observable that is not known is not a number.
+pub(super) fn changes(
+    specification: &JobSpecification,
+    set: usize,
+    best: &BestPoint,
+    row: &Evaluation,
+) -> Option<MomentVector> {
+    let base = best.velocity?.moments;
+    let means = best.observables.map(|found| found.map(|found| found.mean));
+    let of_data = specification.data.as_ref()?.compared(set).observables;
+    Some(moment_vector(log_ratios(row.moments?, base), |one| match of_data[one] {
+        Some(measured) => {
+            let [found, base] = [row.observables[one], means[one]];
+            found.zip(base).map_or(f64::NAN, |(found, base)| (found - base) / measured)
+        }
+        None => 0.0,
+    }))
 }
 
 impl Jacobian {

@@ -27,6 +27,8 @@ pub struct Noise {
     pub data: Option<DataNoise>,
     /// Variances of the model's moments by sampling.
     pub model: MomentVector,
+    /// Covariance of what is the same for all data and not known exactly.
+    pub systematic: MomentMatrix,
 }
 
 /// Noise of the data's moments.
@@ -50,7 +52,11 @@ pub fn noise(
     observables: &ObservableEstimates,
 ) -> Noise {
     let errors = model_errors(&data.compared(set), model, observables);
-    Noise { data: data_noise(data, set), model: errors.map(|error| error * error) }
+    Noise {
+        data: data_noise(data, set),
+        model: errors.map(|error| error * error),
+        systematic: [[0.0; MOMENTS]; MOMENTS],
+    }
 }
 
 /// Returns the relative standard errors, by sampling, of a model's moments in which it is compared with
@@ -109,9 +115,13 @@ fn of_normal_law(measured: Moments, matched: Moments, count: u64) -> Option<Data
 }
 
 impl Noise {
-    /// Returns the covariance of both together.
+    /// Returns the covariance of all together.
     pub fn covariance(&self) -> MomentMatrix {
-        let mut sum = self.data.map_or([[0.0; MOMENTS]; MOMENTS], |data| data.covariance);
+        let mut sum = self.systematic;
+        if let Some(DataNoise { covariance, .. }) = self.data {
+            let entries = sum.iter_mut().flatten().zip(covariance.iter().flatten());
+            entries.for_each(|(sum, entry)| *sum += entry);
+        }
         for (axis, variance) in self.model.into_iter().enumerate() {
             sum[axis][axis] += variance;
         }

@@ -4,7 +4,8 @@ use std::array;
 
 use super::linear::{Linear, NoiseResponse};
 use super::noise::{NORMAL, Noise};
-use crate::conclusions::{DerivedQuantity, Uncertainty};
+use super::systematic::{Effects, contributions, quadratic};
+use crate::conclusions::{BudgetQuantity, DerivedQuantity, QuantityBudget, Uncertainty};
 use crate::data_statistics::{FewIntervals, intervals_of_data};
 use crate::ensemble::DISPERSION_MAX;
 use crate::job::{Data, JobSpecification, Range};
@@ -55,17 +56,43 @@ pub(super) struct Quantities<'a> {
     pub(super) ends: Option<LogarithmicEnds>,
     /// Whether intervals can be stated.
     pub(super) known: bool,
+    /// What is the same for all data moves; `None` if this is not known.
+    pub(super) effects: Option<&'a Effects>,
 }
 
 impl Quantities<'_> {
     /// √(c1111/ρ). Its logarithm is close to normally distributed.
     pub(super) fn bulk_velocity(&self, free: &[Parameter]) -> Option<DerivedQuantity> {
+        let (logarithm, gradient) = self.bulk_logarithm(free)?;
+        Some(self.of_logarithm(libm::exp(logarithm), &gradient))
+    }
+
+    /// Returns ln √(c1111/ρ) with its gradient in units of the box.
+    fn bulk_logarithm(&self, free: &[Parameter]) -> Option<(f64, Vec<f64>)> {
         let bulk = self.specification.setup.structure.bulk_velocity(&self.best.point).ok()?;
         let slope = |&parameter: &Parameter| {
             bulk.gradient[parameter as usize] * self.specification.range(parameter).edge()
         };
-        let gradient: Vec<f64> = free.iter().map(slope).collect();
-        Some(self.of_logarithm(libm::exp(bulk.logarithm), &gradient))
+        Some((bulk.logarithm, free.iter().map(slope).collect()))
+    }
+
+    /// Returns the parts of the variances of √(c1111/ρ) and of the free parameters, as far as these are known;
+    /// none if everything but the data is known exactly.
+    pub(super) fn budget(&self, free: &[Parameter]) -> Vec<QuantityBudget> {
+        let Some(effects) = self.effects.filter(|effects| self.known && !effects.is_empty()) else {
+            return Vec::new();
+        };
+        let of = |quantity, gradient: &[f64]| QuantityBudget {
+            quantity,
+            contributions: contributions(gradient, self.linear, self.noise, effects),
+        };
+        let bulk = self.bulk_logarithm(free);
+        let bulk = bulk.map(|(_, gradient)| of(BudgetQuantity::BulkVelocity, &gradient));
+        let parameter = |&parameter: &Parameter| {
+            of(BudgetQuantity::Parameter(parameter), &self.along(parameter, free, 1.0))
+        };
+        let all = bulk.into_iter().chain(free.iter().map(parameter));
+        all.filter(|budget| !budget.contributions.is_empty()).collect()
     }
 
     /// The dispersion, whose interval ends where the law does.
@@ -179,7 +206,7 @@ impl Quantities<'_> {
 
     /// Combines the intervals of the moments, which are not symmetric, by the squares of the distances
     /// of their ends (MOVER: G. Y. Zou, "Toward using confidence intervals to compare correlations",
-    /// Psychol. Methods 12 (2007)), with the sampling's noise.
+    /// Psychol. Methods 12 (2007)), with what does not come from the data.
     fn combined(
         &self,
         transfer: MomentVector,
@@ -197,6 +224,7 @@ impl Quantities<'_> {
         });
         let by_sampling = transfer.iter().zip(self.noise.model);
         let sampling: f64 = by_sampling.map(|(by, variance)| by * by * variance).sum();
+        let beside_data = sampling + quadratic(&transfer, &self.noise.systematic);
         [0, 1].map(|side| {
             // An end of the quantity comes from the same end of a moment that raises it.
             let part = |axis: usize| match transfer[axis] {
@@ -211,7 +239,7 @@ impl Quantities<'_> {
             let pairs = (0..MOMENTS).flat_map(|i| (0..i).map(move |j| (i, j)));
             let both: f64 = pairs.map(|(i, j)| correlation(i, j) * parts[i] * parts[j]).sum();
             let own: f64 = parts.iter().map(|part| part * part).sum();
-            ((own + 2.0 * both).max(0.0) + NORMAL * NORMAL * sampling).sqrt()
+            ((own + 2.0 * both).max(0.0) + NORMAL * NORMAL * beside_data).sqrt()
         })
     }
 

@@ -13,6 +13,7 @@ use crate::parameters::{Parameter, Point};
 use crate::random_quantities::RandomQuantities;
 use crate::results::{Estimate, EvaluationRole, Moments};
 use crate::special::standard_normal_quantile;
+use crate::systematic::Systematic;
 
 /// v = 0.99 √(c1111/ρ), Δ = 0.27 δ.
 fn model(point: &Point) -> Moments {
@@ -49,6 +50,7 @@ fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecifi
             }
         })),
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),

@@ -9,12 +9,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use osteon_common::outcomes::Outcomes;
-use osteon_common::parameters::Point;
+use osteon_common::parameters::{Point, PointBits};
 use osteon_common::results::EstimatedError;
 use osteon_search::{Assessment, Branch, same_point};
 
 use crate::core::evaluation::PendingEvaluation;
-use crate::core::saved::{PointBits, point_bits};
 use crate::core::worker_name::WorkerName;
 
 /// What a job computes before its search asks for it.
@@ -82,7 +81,7 @@ impl Ahead {
 
     /// Returns the complete evaluation of a point.
     pub(crate) fn prepared_evaluation(&self, point: &Point) -> Option<&PreparedEvaluation> {
-        self.prepared.get(&point_bits(point))
+        self.prepared.get(&point.bits())
     }
 
     /// Takes the complete evaluations that have waited since `before` and are not in the store.
@@ -99,7 +98,7 @@ impl Ahead {
 
     /// Keeps the complete evaluation of a point.
     pub(crate) fn prepare(&mut self, point: &Point, prepared: PreparedEvaluation) {
-        self.prepared.insert(point_bits(point), prepared);
+        self.prepared.insert(point.bits(), prepared);
     }
 
     /// Passes the evaluation of a part's branch to the branch, and keeps it for the search, if it is
@@ -128,7 +127,7 @@ impl Ahead {
     /// Passes the complete evaluation of a point, if there is one, to a branch that asks for it; returns
     /// whether there is. It stays for further parts if it was not computed for this one.
     pub(crate) fn tell_prepared(&mut self, branch: usize, point: &Point) -> bool {
-        let Some(prepared) = self.prepared.get_mut(&point_bits(point)) else {
+        let Some(prepared) = self.prepared.get_mut(&point.bits()) else {
             return false;
         };
         let Some(FollowedBranch { part, branch, .. }) = self.branches.get_mut(branch) else {
@@ -145,9 +144,9 @@ impl Ahead {
     /// Takes the complete evaluation of a point that the search asks for in part number `part`. It stays
     /// if it was not computed for this part alone.
     pub(crate) fn take_prepared(&mut self, point: &Point, part: u64) -> Option<PreparedEvaluation> {
-        let prepared = self.prepared.get_mut(&point_bits(point))?;
+        let prepared = self.prepared.get_mut(&point.bits())?;
         if prepared.part == Some(part) {
-            return self.prepared.remove(&point_bits(point));
+            return self.prepared.remove(&point.bits());
         }
         prepared.part = None;
         Some(PreparedEvaluation { unsaved: None, ..prepared.clone() })

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use osteon_common::parameters::Point;
 use osteon_search::same_point;
 use thiserror::Error;
 
@@ -151,10 +150,9 @@ fn check_jobs(state: &State) -> Result<(), Inconsistency> {
 fn check_speculation(job: &Job) -> Result<(), Inconsistency> {
     let Speculation { candidates, evaluations } = &job.speculation;
     let under_way = is_under_way(job);
-    let bits = |point: &Point| point.0.map(f64::to_bits);
-    let points: BTreeSet<_> = job.evaluations().map(|it| bits(&it.point)).collect();
+    let points: BTreeSet<_> = job.evaluations().map(|it| it.point.bits()).collect();
     let is_candidate =
-        |of: &PendingEvaluation| candidates.iter().any(|at| bits(at) == bits(&of.point));
+        |of: &PendingEvaluation| candidates.iter().any(|at| same_point(at, &of.point));
     let fits = evaluations.iter().all(is_candidate)
         && points.len() == job.evaluations().count()
         && candidates.len() <= CANDIDATES_MAX

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use osteon_common::observables::ObservableSet;
-use osteon_common::parameters::{PARAMETERS, Point};
+use osteon_common::parameters::PointBits;
 
 use crate::core::audit::{self, AuditKey};
 use crate::core::evaluation::{Audit, PendingEvaluation, StoredRecord};
@@ -16,13 +16,6 @@ use crate::core::indices::Indices;
 use crate::core::policy::PIECE_MAX;
 use crate::core::worker_name::WorkerName;
 use crate::store::{PIECE_OUTCOMES, PartPiece, PartRecord, PieceRecord};
-
-/// A point, to be compared to the bit.
-pub(crate) type PointBits = [u64; PARAMETERS];
-
-pub(crate) fn point_bits(point: &Point) -> PointBits {
-    point.0.map(f64::to_bits)
-}
 
 /// Results that an earlier coordinator saved for a job, by the points of their evaluations.
 #[derive(Debug, Default)]
@@ -34,7 +27,7 @@ impl SavedParts {
         let mut saved = Self::default();
         for PartRecord { point, pieces, .. } in records {
             let sound = pieces.into_iter().filter(|piece| !banned(&piece.by));
-            saved.0.entry(point_bits(&point)).or_default().extend(sound);
+            saved.0.entry(point.bits()).or_default().extend(sound);
         }
         saved
     }
@@ -47,7 +40,7 @@ impl SavedParts {
         job: JobId,
         (key, fraction): (&AuditKey, f64),
     ) {
-        let Some(pieces) = self.0.remove(&point_bits(&evaluation.point)) else {
+        let Some(pieces) = self.0.remove(&evaluation.point.bits()) else {
             return;
         };
         let number = evaluation.number;
@@ -133,6 +126,7 @@ fn take_first(of: &mut Vec<Indices>, most: u64) -> Vec<Indices> {
 mod tests {
     use osteon_common::outcome::RealizationResult;
     use osteon_common::outcomes::Outcomes;
+    use osteon_common::parameters::Point;
 
     use super::*;
 

@@ -188,7 +188,7 @@ fn is_same(row: &Evaluation, last: &Evaluation) -> bool {
     let bits = |row: &Evaluation| {
         let moments =
             row.moments.map(|it| [it.mean, it.coefficient_of_variation].map(f64::to_bits));
-        (row.number, row.point.0.map(f64::to_bits), row.cost.map(f64::to_bits), moments)
+        (row.number, row.point.bits(), row.cost.map(f64::to_bits), moments)
     };
     bits(row) == bits(last)
 }

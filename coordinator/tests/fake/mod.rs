@@ -12,6 +12,7 @@ use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, JobResult};
+use osteon_common::systematic::Systematic;
 use osteon_common::version::{self, Program, VERSION};
 use osteon_coordinator::core::effect::Record;
 use osteon_coordinator::core::event::{Event, Hello, Request};
@@ -49,6 +50,7 @@ pub(crate) fn identification(
             upper,
         })),
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo {
             realizations,
             seed,

@@ -29,7 +29,7 @@ fn every_material_is_admissible_and_plausible_as_bone() {
     for (name, material) in all() {
         assert_eq!(material.constants().violated(), [], "{name}");
         let values = Parameter::OF_BONE.map(|parameter| material.value(parameter).unwrap_or(0.1));
-        let point = Point(extended(values, AS_IN_SETUP));
+        let point = Point::new(extended(values, AS_IN_SETUP));
         let bulk = osteon_common::bulk_velocity::bulk_velocity(&point).unwrap();
         let velocity = libm::exp(bulk.logarithm);
         assert!((3000.0..4500.0).contains(&velocity), "{name}: {velocity} m/s");

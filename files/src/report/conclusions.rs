@@ -105,6 +105,37 @@ impl From<&DerivedQuantity> for QuantityEstimate {
     }
 }
 
+/// What makes the variance of a quantity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct QuantityBudget {
+    /// `bulk_velocity`, or a free parameter.
+    pub quantity: String,
+    /// The parts, which add up to 1.
+    pub contributions: Vec<Contribution>,
+}
+
+/// A part of a variance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Contribution {
+    /// `data`, `sampling`, or a key of the job's `systematic`.
+    pub source: String,
+    /// Part of the whole variance, 0 to 1.
+    pub variance_share: f64,
+}
+
+/// Returns the budgets of all quantities that have one.
+pub(super) fn budget(found: &Inference) -> Vec<QuantityBudget> {
+    let contribution = |one: &osteon_common::inference::Contribution| Contribution {
+        source: one.source.name().to_owned(),
+        variance_share: one.variance_share,
+    };
+    let budget = |one: &osteon_common::inference::QuantityBudget| QuantityBudget {
+        quantity: one.quantity.name().to_owned(),
+        contributions: one.contributions.iter().map(contribution).collect(),
+    };
+    found.budget.iter().map(budget).collect()
+}
+
 /// A direction of the box that the data fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Direction {

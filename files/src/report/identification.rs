@@ -11,7 +11,9 @@ use osteon_common::settings::Picking;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::conclusions::{Identified, ParameterProfile, Solutions, profiles, sensitivities};
+use super::conclusions::{
+    Identified, ParameterProfile, QuantityBudget, Solutions, budget, profiles, sensitivities,
+};
 use super::schema::{keyed_by_failure, keyed_by_parameter};
 use super::{
     Data, EstimatedErrors, IntegrityReport, MeanModel, MomentSlopes, PosteriorReport, ReadError,
@@ -89,6 +91,10 @@ pub struct Identification {
         deserialize_with = "absent_or_nullable"
     )]
     pub identified: Option<Option<Identified>>,
+    /// What makes the variance of each quantity that is known; only where the job names something that is the
+    /// same for all data and not known exactly.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub budget: Vec<QuantityBudget>,
     /// For each free parameter the lowest cost with it held at values from bound to bound.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(transform = keyed_by_parameter)]
@@ -173,6 +179,7 @@ impl From<&JobResult> for Identification {
             search: SearchSettings::from(result),
             sensitivities: single.map(|_| inference.map(sensitivities)),
             identified: single.map(|_| inference.map(Identified::from)),
+            budget: single.and(inference).map(budget).unwrap_or_default(),
             profiles: single.map(|_| profiles(conclusions)).unwrap_or_default(),
             solutions: single.and(conclusions.solutions.as_ref()).map(Solutions::from),
             posterior: single.map(|_| conclusions.posterior.as_ref().map(PosteriorReport::from)),
@@ -249,6 +256,10 @@ pub struct Group {
     pub sensitivities: Option<BTreeMap<Parameter, MomentSlopes>>,
     /// The quantities that the data determine; null where the derivatives were not measured.
     pub identified: Option<Identified>,
+    /// What makes the variance of each quantity that is known; only where the job names something that is the
+    /// same for all data and not known exactly.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub budget: Vec<QuantityBudget>,
     /// For each free parameter the lowest cost with it held at values from bound to bound.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(transform = keyed_by_parameter)]
@@ -281,6 +292,7 @@ impl Group {
             failures: found.failures,
             sensitivities: inference.map(sensitivities),
             identified: inference.map(Identified::from),
+            budget: inference.map(budget).unwrap_or_default(),
             profiles: profiles(&group.conclusions),
             solutions: group.conclusions.solutions.as_ref().map(Solutions::from),
             posterior: group.conclusions.posterior.as_ref().map(PosteriorReport::from),

@@ -61,7 +61,7 @@ impl MeanModel {
 
     /// The whole point, with this dispersion; `None` where a number is missing.
     pub fn point(&self, dispersion: Option<f64>) -> Option<Point> {
-        let mut point = Point([AS_IN_SETUP; PARAMETERS]);
+        let mut point = Point::new([AS_IN_SETUP; PARAMETERS]);
         for parameter in Parameter::ALL {
             let value = match parameter {
                 Parameter::Dispersion => dispersion,

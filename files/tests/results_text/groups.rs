@@ -42,6 +42,7 @@ fn found(known: bool) -> Inference {
         bulk_velocity: quantity(3960.5, [3950.25, 3970.75]),
         dispersion: quantity(0.1029, [0.1, 0.11]),
         parameters: vec![(Parameter::LongitudinalYoungModulus, modulus)],
+        budget: Vec::new(),
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) fn points(specification: &JobSpecification, count: usize) -> Vec<Poin
 /// Returns the corner of the box with slow shear waves, a large dispersion, a thin plate and a strong
 /// attenuation; other parameters are as at the start.
 fn slowest_corner(ranges: &[Range; PARAMETERS]) -> Point {
-    let mut corner = Point(ranges.map(|range| range.start()));
+    let mut corner = Point::new(ranges.map(|range| range.start()));
     for (parameter, upper_end) in [
         (Parameter::LongitudinalShearModulus, false),
         (Parameter::Dispersion, true),

@@ -1,6 +1,7 @@
 use osteon_common::job::{Data, Group, MonteCarlo, Objective, Search};
 use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::random_quantities::RandomQuantities;
+use osteon_common::systematic::Systematic;
 
 use super::*;
 
@@ -19,6 +20,7 @@ fn job(data: Data, density: Range) -> JobSpecification {
         data: Some(data),
         parameters,
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),

@@ -68,7 +68,7 @@ properties! {
         let varied = varied.map(|k| Parameter::ALL[k]);
         let has = PerObservable(has);
         let observables = has.map(|has| has.then_some(observed));
-        let role = EvaluationRole { group, start, varied, posterior };
+        let role = EvaluationRole { group, start, varied, shifted: false, posterior };
         let evaluation =
             Evaluation { number, role, point, moments, observables, cost, failures, estimated_error };
         let message = evaluation_to_message(&evaluation);

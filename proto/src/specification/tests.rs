@@ -45,6 +45,7 @@ fn message() -> v1::JobSpecification {
         data: Some(Data::from_moments(3906.0, 0.027)),
         parameters: Range::of_bone(std::array::from_fn(free)),
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),

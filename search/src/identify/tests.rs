@@ -8,8 +8,10 @@ use osteon_common::job::{
 };
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, Status};
+use osteon_common::systematic::Systematic;
 
 mod observables;
+mod systematic;
 
 use super::*;
 
@@ -25,6 +27,7 @@ fn specification(data: Data, method: SearchMethod) -> JobSpecification {
         data: Some(data),
         parameters,
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo { realizations: 50, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations: 60, ..SearchSettings::by(method) },

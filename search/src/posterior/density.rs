@@ -56,6 +56,7 @@ mod tests {
     use osteon_common::moments::Moments;
     use osteon_common::observables::ObservedColumns;
     use osteon_common::random_quantities::RandomQuantities;
+    use osteon_common::systematic::Systematic;
 
     use super::*;
 
@@ -74,6 +75,7 @@ mod tests {
             data: Some(data),
             parameters,
             random: RandomQuantities::default(),
+            systematic: Systematic::default(),
             monte_carlo: MonteCarlo::default(),
             objective: Objective::Moments,
             search: Search::default(),

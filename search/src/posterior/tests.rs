@@ -15,6 +15,7 @@ use osteon_common::posterior::{Posterior, PosteriorSummary};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::Moments;
 use osteon_common::special::standard_normal_quantile;
+use osteon_common::systematic::Systematic;
 
 use super::features::features;
 use super::population::closed_form;
@@ -82,6 +83,7 @@ fn specification(
         data: Some(Data::from_velocities(velocities(&OPTIMUM, count))),
         parameters,
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::Moments,
         search: Search::default(),
@@ -235,7 +237,7 @@ fn check_with_points_of_the_prior(specification: &JobSpecification, model: Model
         .iter()
         .map(|uniforms| {
             let mut uniforms = uniforms.iter();
-            let point = Point(specification.parameters.map(|range| match range {
+            let point = Point::new(specification.parameters.map(|range| match range {
                 Range::Fixed(value) => value,
                 Range::Free { lower, upper, .. } => {
                     lower + (upper - lower) * uniforms.next().unwrap()

@@ -53,5 +53,5 @@ fn distinct(points: impl IntoIterator<Item = Point>, but: Option<Point>) -> Vec<
 
 /// Returns whether two points are equal to the bit.
 pub fn same_point(a: &Point, b: &Point) -> bool {
-    a.0.map(f64::to_bits) == b.0.map(f64::to_bits)
+    a.bits() == b.bits()
 }

@@ -49,7 +49,7 @@ pub(super) struct DatasetSearch {
     /// search.
     stop: Option<StopReason>,
     /// Points that measure derivatives, in reverse order.
-    differences: Vec<(Parameter, Point)>,
+    differences: Vec<(Option<Parameter>, Point)>,
     /// Feasible points of the search, kept only for a posterior.
     known: Vec<(Point, ComparedMoments)>,
     /// Points of the posterior, which come last.
@@ -216,8 +216,11 @@ impl DatasetSearch {
             self.tell_posterior(specification, &mut row, outcomes);
         } else if let Some((varied, _)) = self.differences.pop() {
             let start = self.best().map_or(0, |best| best.role.start);
-            row.role = EvaluationRole { start, varied: Some(varied), ..row.role };
-            row.moments = statistics.moments.filter(|_| self.fails_alike(&outcomes));
+            let shifted = row.point.shift().is_some();
+            row.role = EvaluationRole { start, varied, shifted, ..row.role };
+            // Another setup may make other realizations fail, and its effect is no small one.
+            let is_kept = if shifted { statistics.feasible } else { self.fails_alike(&outcomes) };
+            row.moments = statistics.moments.filter(|_| is_kept);
             if row.moments.is_none() {
                 row.observables = ObservableValues::default();
             }
@@ -461,8 +464,9 @@ fn space_of_start(specification: &JobSpecification, set: usize, start: u32) -> S
     usable.next().unwrap_or(space)
 }
 
-/// Returns points close to `best`, each differing in one free parameter, the first parameter last.
-fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Parameter, Point)> {
+/// Returns points close to `best`, each differing in one free parameter, the first parameter last, after
+/// those that measure what uncertain quantities of the setup move.
+fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Option<Parameter>, Point)> {
     let beside = |parameter: Parameter| {
         let Range::Free { lower, upper, .. } = specification.range(parameter) else {
             return None;
@@ -472,11 +476,21 @@ fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Parameter
         let moved = |value: f64| {
             let mut point = *best;
             point.0[parameter as usize] = value;
-            (parameter, point)
+            (Some(parameter), point)
         };
         let steps = [value + step, value - step].into_iter();
         let mut within = steps.filter(|value| (lower..=upper).contains(value)).map(moved);
         within.find(|(_, point)| admissible(&specification.setup.structure, point))
     };
-    Parameter::ALL.into_iter().rev().filter_map(beside).collect()
+    let free = Parameter::ALL.into_iter().rev().filter_map(beside);
+    shifted_points(specification, best).into_iter().chain(free).collect()
+}
+
+/// Returns the points with which the effects of uncertain quantities of the setup are measured.
+fn shifted_points(
+    specification: &JobSpecification,
+    best: &Point,
+) -> Vec<(Option<Parameter>, Point)> {
+    let shifts = specification.shifts(&best.setup(&specification.setup));
+    shifts.into_iter().map(|shift| (None, best.shifted(Some(shift)))).collect()
 }

@@ -10,6 +10,7 @@ use osteon_common::parameters::Parameter;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::realization::Ensemble;
 use osteon_common::results::Moments;
+use osteon_common::systematic::Systematic;
 
 use super::*;
 
@@ -32,6 +33,7 @@ fn specification(max_evaluations: u64) -> JobSpecification {
         data: Some(Data::from_moments(3900.0, 0.03)),
         parameters,
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo { realizations: 4, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations, ..SearchSettings::default() },

@@ -123,6 +123,7 @@ fn what_others_say_is_shown_without_hidden_characters() {
     let directory = Path::new(hostile);
     let result = ShownResult {
         specification: &specification,
+        usual_shifts: &[],
         result: &identification(&json),
         directory: Some(directory),
         detail: Detail::Usual,

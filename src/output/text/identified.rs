@@ -4,7 +4,9 @@ use osteon_common::bone_structure::BoneStructure;
 use osteon_common::inference::Spread;
 use osteon_common::job::Objective;
 use osteon_common::parameters::Parameter;
-use osteon_files::report::{Identification, Identified, Moments, QuantityEstimate, Solution};
+use osteon_files::report::{
+    Contribution, Identification, Identified, Moments, QuantityBudget, QuantityEstimate, Solution,
+};
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, digits, measured, significant};
@@ -38,6 +40,7 @@ pub(super) fn text(found: &Identification, structure: &BoneStructure) -> String 
             wrapped(&heading(known, found.objective)),
             aligned(&rows(known))
         ));
+        text.push_str(&budget(&found.budget));
     }
     text.push_str(&solutions(found, structure));
     // Evaluations are counted from 0.
@@ -65,6 +68,30 @@ fn rows(known: &Identified) -> Vec<[String; 3]> {
         }
     }
     rows
+}
+
+/// Says what makes the variance of each quantity, the largest part first; empty without a budget.
+fn budget(budgets: &[QuantityBudget]) -> String {
+    let part = |one: &Contribution| {
+        let percent = digits(100.0 * one.variance_share, 2);
+        glued(&format!("{} {percent} %", one.source.replace('_', " ")))
+    };
+    let row = |budget: &QuantityBudget| {
+        let mut parts: Vec<&Contribution> = budget.contributions.iter().collect();
+        parts.sort_by(|a, b| b.variance_share.total_cmp(&a.variance_share));
+        let name = match budget.quantity.as_str() {
+            "bulk_velocity" => SPEED.to_owned(),
+            name => name.replace('_', " "),
+        };
+        let parts: Vec<String> = parts.into_iter().map(part).collect();
+        [name, parts.join(", ")]
+    };
+    let rows: Vec<[String; 2]> = budgets.iter().map(row).collect();
+    if rows.is_empty() {
+        String::new()
+    } else {
+        format!("\nParts of their variances:\n{}", aligned(&rows))
+    }
 }
 
 /// Returns name, value and interval of a known quantity, to the same decimal.

@@ -16,7 +16,7 @@ use osteon_search::search_box::SearchBox;
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::{DIGITS, Decimals, FREE_DIGITS, digits, measured, significant};
-use super::{data_notes, details, fit, groups, identified, posterior, solver};
+use super::{data_notes, details, fit, groups, identified, posterior, set_up, solver};
 use crate::output::{Detail, ShownResult};
 
 /// Returns the table.
@@ -29,7 +29,7 @@ pub(super) fn table(shown: &ShownResult<'_>) -> String {
     }
     let solver = match shown.result {
         ResultFile::Identification(found) => {
-            identification(&mut text, found, shown.specification);
+            identification(&mut text, found, shown);
             &found.solver
         }
         ResultFile::Propagation(found) => {
@@ -78,7 +78,8 @@ fn summary(shown: &ShownResult<'_>) -> String {
     }
 }
 
-fn identification(text: &mut String, found: &Identification, specification: &JobSpecification) {
+fn identification(text: &mut String, found: &Identification, shown: &ShownResult<'_>) {
+    let specification = shown.specification;
     text.push_str(&headline(found, specification));
     let Identification { evaluations, realizations, .. } = found;
     let mut count = format!("{evaluations} evaluations of {realizations} realizations");
@@ -122,6 +123,7 @@ fn identification(text: &mut String, found: &Identification, specification: &Job
     if fit::fits(found, specification) {
         text.push_str(&fit::uniqueness(found, &point, specification));
         text.push_str(&identified::text(found, &specification.setup.structure));
+        text.push_str(&set_up::text(found, shown.usual_shifts));
     } else {
         text.push_str(&fit::misfit(found, &point, specification));
         let of_posterior = match fit::has_outliers(found) {

@@ -187,7 +187,11 @@ fn random_effects(seed: u64) -> Group {
 
 /// Returns whether the intervals of the logarithms of both moments by the delta method hold them.
 fn delta_method_holds(data: &Data) -> [bool; 2] {
-    let noise = Noise { data: data_noise(data, 0), model: [0.0; MOMENTS] };
+    let noise = Noise {
+        data: data_noise(data, 0),
+        model: [0.0; MOMENTS],
+        systematic: [[0.0; MOMENTS]; MOMENTS],
+    };
     let covariance = noise.covariance();
     let found = data.moments(0);
     let errors = [libm::log(found.mean / 3900.0), libm::log(found.coefficient_of_variation / 0.03)];

@@ -8,6 +8,7 @@ use osteon_common::case::Setup;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{Outcome, RealizationResult};
 use osteon_common::random_quantities::RandomQuantities;
+use osteon_common::systematic::Systematic;
 use osteon_common::version;
 
 use super::*;
@@ -142,6 +143,7 @@ fn propagation(realizations: u64) -> JobSpecification {
             [1598.8, 17.717e9, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.1029].map(Range::Fixed),
         ),
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo { realizations, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: Search::default(),

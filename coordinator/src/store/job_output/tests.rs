@@ -8,6 +8,7 @@ use osteon_common::job::{Data, JobKind, MonteCarlo, Objective, Range, Search as 
 use osteon_common::outcomes::Outcomes;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::EstimatedError;
+use osteon_common::systematic::Systematic;
 use osteon_common::version::Program;
 use osteon_search::{Ending, Search, Step};
 
@@ -35,6 +36,7 @@ pub(crate) fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
         data: Some(Data::from_moments(3900.0, 0.03)),
         parameters,
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo { realizations: 2, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations: 8, ..SearchSettings::default() },

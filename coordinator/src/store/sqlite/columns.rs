@@ -7,6 +7,7 @@ use osteon_common::observables::{OBSERVABLES, ObservedColumns, PerObservable};
 use osteon_common::outcome::{Outcome, decode, encode};
 use osteon_common::parameters::{BONE_PARAMETERS, PARAMETERS, Point};
 use osteon_common::results::EstimatedError;
+use osteon_common::systematic::{Shift, SystematicQuantity};
 use osteon_common::version::Program;
 
 use crate::core::ids::JobId;
@@ -195,19 +196,33 @@ pub(super) fn unpack_errors(packed: &[u8]) -> Option<EstimatedError> {
     rest.is_empty().then_some(EstimatedError { median, largest })
 }
 
-/// Packs the numbers of the bone, and all others too if any of them is searched.
+/// Packs the numbers of the bone, and all others too if any of them is searched; and then number and value of
+/// the quantity by which the point is shifted, if it is.
 pub(super) fn pack_point(point: Point) -> Vec<u8> {
     let of_bone = point.given().all(|(parameter, _)| parameter.of_setup().is_none());
     let count = if of_bone { BONE_PARAMETERS } else { PARAMETERS };
-    point.0.into_iter().take(count).flat_map(f64::to_le_bytes).collect()
+    let shift = point.shift().map(|Shift { quantity, value }| [f64::from(quantity as u8), value]);
+    let values = point.0.into_iter().take(count).chain(shift.into_iter().flatten());
+    values.flat_map(f64::to_le_bytes).collect()
 }
 
 pub(super) fn unpack(point: &[u8]) -> Option<Point> {
     let (values, rest) = point.as_chunks::<8>();
     let values: Vec<f64> = values.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
-    let of_bone = || <[f64; BONE_PARAMETERS]>::try_from(values.as_slice()).map(Point::of_bone);
-    let all = || <[f64; PARAMETERS]>::try_from(values.as_slice()).map(Point);
-    rest.is_empty().then(|| of_bone().or_else(|_| all()).ok()).flatten()
+    let (numbers, shift) = match values.as_slice() {
+        [numbers @ .., quantity, value]
+            if [BONE_PARAMETERS, PARAMETERS].contains(&numbers.len()) =>
+        {
+            let is_one = |one: &SystematicQuantity| f64::from(*one as u8) == *quantity;
+            let quantity = SystematicQuantity::ALL.into_iter().find(is_one)?;
+            (numbers, Some(Shift { quantity, value: *value }))
+        }
+        numbers => (numbers, None),
+    };
+    let of_bone = || <[f64; BONE_PARAMETERS]>::try_from(numbers).map(Point::of_bone);
+    let all = || <[f64; PARAMETERS]>::try_from(numbers).map(Point::new);
+    let point = of_bone().or_else(|_| all()).ok().filter(|_| rest.is_empty());
+    point.map(|point| point.shifted(shift))
 }
 
 /// Packs worker names, one line each: the process, a slash and the number that it drew in

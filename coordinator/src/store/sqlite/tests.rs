@@ -12,6 +12,7 @@ use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::Point;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::{EstimatedError, EvaluationRole, GroupEnding, Status};
+use osteon_common::systematic::Systematic;
 
 use super::acknowledged::MarkFile;
 use super::opening::{FILE, Journal, open_file};
@@ -34,6 +35,7 @@ pub(super) fn job(id: u64) -> JobRecord {
         data: Some(Data::from_velocities(vec![3900.25, 3901.5])),
         parameters,
         random: RandomQuantities::default(),
+        systematic: Systematic::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),

@@ -17,6 +17,7 @@ use osteon_common::pulse::PulseForm;
 use osteon_common::pulse_samples::PulseSamples;
 use osteon_common::random_quantities::{RandomDistribution, Scatter};
 use osteon_common::settings::{Method, SolverSettings};
+use osteon_common::systematic::{Systematic, SystematicLaw, SystematicQuantity};
 use proptest::prelude::*;
 
 use super::*;
@@ -316,12 +317,15 @@ prop_compose! {
             let drawn = matches!(range, Range::Free { .. }) && method == SearchMethod::Simplex;
             *prior = weight.filter(|_| drawn).map(|weight| Prior { value: range.start(), weight });
         }
+        let allowed = data.is_some() && sensitivities && !needs_noise;
+        let systematic = uncertain_offset(allowed, max_failed_fraction);
         let specification = JobSpecification {
             kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
             setup,
             data,
             parameters,
             random,
+            systematic,
             monte_carlo: MonteCarlo {
                 realizations: points * scrambles.unwrap_or(1),
                 seed,
@@ -344,4 +348,15 @@ prop_compose! {
         };
         specification.with_implied(Omitted::default())
     }
+}
+
+/// Returns an uncertain offset of the velocities, where the job allows any.
+fn uncertain_offset(allowed: bool, spread: f64) -> Systematic {
+    let mut systematic = Systematic::default();
+    if allowed {
+        let distribution = RandomDistribution::Uniform;
+        systematic.laws[SystematicQuantity::VelocityOffset as usize] =
+            SystematicLaw { spread: Some(spread), distribution, center: Some(0.0) };
+    }
+    systematic
 }
