@@ -257,6 +257,7 @@ fn documented_is_real(runs: &Runs) {
                 | "decay"
                 | "other_velocity"
                 | "center_frequency"
+                | "budget"
                     if !real.contains(&name) =>
                 {
                     Vec::new()

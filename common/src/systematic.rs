@@ -131,7 +131,7 @@ impl SystematicQuantity {
             Self::CenterFrequency => "probe.center_frequency",
             Self::Tilt => "probe.tilt",
             Self::PorosityGradient => "bone.porosity",
-            Self::VelocityOffset => "the offset that the job subtracts",
+            Self::VelocityOffset => "the center of an offset",
         }
     }
 

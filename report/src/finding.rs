@@ -10,7 +10,7 @@ use osteon_common::parameters::Parameter;
 use osteon_common::results::Status;
 use osteon_files::report::{
     Data, EstimatedErrors, Group, Identification, Identified, MeanModel, ParameterProfile,
-    PosteriorReport, Propagation, Solutions, Solver, Velocity,
+    PosteriorReport, Propagation, QuantityBudget, Solutions, Solver, Velocity,
 };
 
 use crate::figure_names;
@@ -43,6 +43,8 @@ pub(crate) struct Finding<'a> {
     pub(crate) failures: &'a BTreeMap<FailureKind, u64>,
     /// What the data determine.
     pub(crate) identified: Option<&'a Identified>,
+    /// What makes the variance of each known quantity; empty where the job names no systematic error.
+    pub(crate) budget: &'a [QuantityBudget],
     /// The profiles; empty where there are none.
     pub(crate) profiles: Option<&'a BTreeMap<Parameter, ParameterProfile>>,
     /// The solutions from several starts.
@@ -89,6 +91,7 @@ impl<'a> Finding<'a> {
             data: result.data.as_ref(),
             failures: &result.failures,
             identified: result.identified(),
+            budget: &result.budget,
             profiles: Some(&result.profiles),
             solutions: result.solutions.as_ref(),
             posterior: result.posterior(),
@@ -121,6 +124,7 @@ impl<'a> Finding<'a> {
             data: Some(&group.data),
             failures: &group.failures,
             identified: group.identified.as_ref(),
+            budget: &group.budget,
             profiles: Some(&group.profiles),
             solutions: group.solutions.as_ref(),
             posterior: group.posterior.as_ref(),
@@ -149,6 +153,7 @@ impl<'a> Finding<'a> {
             data: None,
             failures: &result.failures,
             identified: None,
+            budget: &[],
             profiles: None,
             solutions: None,
             posterior: None,

@@ -2,7 +2,7 @@
 
 use osteon_common::job::Range;
 use osteon_common::parameters::Parameter;
-use osteon_files::report::{Moment, QuantityEstimate};
+use osteon_files::report::{Moment, QuantityBudget, QuantityEstimate};
 
 use super::markup::{Numbers, none, table, width_precision};
 use crate::finding::Finding;
@@ -16,6 +16,7 @@ pub(super) fn tables(numbers: &Numbers, finding: &Finding<'_>) -> String {
         out.push_str(&found);
     }
     out.push_str(&parameters(numbers, finding));
+    out.push_str(&budget(numbers, finding));
     if finding.cost.is_some() {
         let at = format!("{}/cost", finding.place);
         let cost = numbers.number(finding.cost, &at, NUMBER, Precision::Digits(3));
@@ -111,6 +112,35 @@ fn moments_table(numbers: &Numbers, finding: &Finding<'_>) -> Option<String> {
         row(dispersion, &identified.dispersion, "dispersion", NUMBER),
     ];
     Some(table(name, &columns, &rows))
+}
+
+/// Returns the table of what makes each variance, the largest part of the first quantity's on top; empty where the job
+/// names no systematic error.
+fn budget(numbers: &Numbers, finding: &Finding<'_>) -> String {
+    let Some(first) = finding.budget.first() else { return String::new() };
+    let mut sources: Vec<usize> = (0..first.contributions.len()).collect();
+    let share = |source: &usize| first.contributions[*source].variance_share;
+    sources.sort_by(|a, b| share(b).total_cmp(&share(a)));
+    let row = |source: usize| {
+        let cell = |(quantity, budget): (usize, &QuantityBudget)| {
+            let place = format!(
+                "{}/budget/{quantity}/contributions/{source}/variance_share",
+                finding.place
+            );
+            let share = budget.contributions.get(source).map(|one| one.variance_share);
+            numbers.number(share, &place, NUMBER, Precision::Digits(2))
+        };
+        let name = escape(&first.contributions[source].source.replace('_', " "));
+        [name].into_iter().chain(finding.budget.iter().enumerate().map(cell)).collect()
+    };
+    let rows: Vec<Vec<String>> = sources.into_iter().map(row).collect();
+    let title = |budget: &QuantityBudget| {
+        let parameter = Parameter::ALL.into_iter().find(|one| one.name() == budget.quantity);
+        parameter.map_or("√(c₁₁₁₁/ρ)", |parameter| parameter.row().title)
+    };
+    let columns: Vec<&str> =
+        ["Part of the variance of"].into_iter().chain(finding.budget.iter().map(title)).collect();
+    table("What makes the errors", &columns, &rows)
 }
 
 fn parameters(numbers: &Numbers, finding: &Finding<'_>) -> String {

@@ -15,6 +15,8 @@ use super::result::{readable, scale};
 
 /// Name of √(c1111/ρ).
 const SPEED: &str = "√(c1111/ρ)";
+/// Part of a variance below which a source is not named.
+const SMALL_SHARE: f64 = 0.005;
 /// Relative difference up to which the parameters of several solutions are the same.
 const SAME: f64 = 1e-3;
 
@@ -70,27 +72,57 @@ fn rows(known: &Identified) -> Vec<[String; 3]> {
     rows
 }
 
-/// Says what makes the variance of each quantity, the largest part first; empty without a budget.
+/// Says what makes the variance of each quantity, the largest part first, and what to know better; empty without a
+/// budget.
 fn budget(budgets: &[QuantityBudget]) -> String {
-    let part = |one: &Contribution| {
-        let percent = digits(100.0 * one.variance_share, 2);
-        glued(&format!("{} {percent} %", one.source.replace('_', " ")))
-    };
-    let row = |budget: &QuantityBudget| {
-        let mut parts: Vec<&Contribution> = budget.contributions.iter().collect();
-        parts.sort_by(|a, b| b.variance_share.total_cmp(&a.variance_share));
-        let name = match budget.quantity.as_str() {
-            "bulk_velocity" => SPEED.to_owned(),
-            name => name.replace('_', " "),
-        };
-        let parts: Vec<String> = parts.into_iter().map(part).collect();
-        [name, parts.join(", ")]
-    };
-    let rows: Vec<[String; 2]> = budgets.iter().map(row).collect();
+    let rows: Vec<[String; 2]> =
+        budgets.iter().map(|budget| [budgeted(budget), parts(budget)]).collect();
     if rows.is_empty() {
-        String::new()
-    } else {
-        format!("\nParts of their variances:\n{}", aligned(&rows))
+        return String::new();
+    }
+    let advice = budgets.iter().find_map(advice);
+    let advice = advice.map(|advice| wrapped(&advice)).unwrap_or_default();
+    format!("\nParts of their variances:\n{}{advice}", aligned(&rows))
+}
+
+/// Returns the parts of a variance, the largest first, and the sum of those that are not worth their place.
+fn parts(budget: &QuantityBudget) -> String {
+    let percent = |name: &str, share: f64| glued(&format!("{name} {} %", digits(100.0 * share, 2)));
+    let (mut large, small): (Vec<&Contribution>, Vec<&Contribution>) =
+        budget.contributions.iter().partition(|one| one.variance_share >= SMALL_SHARE);
+    large.sort_by(|a, b| b.variance_share.total_cmp(&a.variance_share));
+    let source = |one: &&Contribution| percent(&one.source.replace('_', " "), one.variance_share);
+    let mut parts: Vec<String> = large.iter().map(source).collect();
+    if !small.is_empty() {
+        let rest = small.iter().map(|one| one.variance_share).sum();
+        parts.push(percent(&format!("{} others", small.len()), rest));
+    }
+    parts.join(", ")
+}
+
+/// Returns what would make a quantity better known; `None` if no part is most of its variance.
+fn advice(budget: &QuantityBudget) -> Option<String> {
+    let most = budget.contributions.iter().find(|one| one.variance_share > 0.5)?;
+    let name = budgeted(budget);
+    Some(match most.source.as_str() {
+        "data" => {
+            format!("Most of the variance of {name} is from the data: more of them reduce it.")
+        }
+        "sampling" => format!(
+            "Most of the variance of {name} is from the model's sampling: raise [monte_carlo] realizations."
+        ),
+        source => format!(
+            "Most of the variance of {name} is from the {}: measure it better first.",
+            source.replace('_', " ")
+        ),
+    })
+}
+
+/// Returns the name of the quantity that a budget is of.
+fn budgeted(budget: &QuantityBudget) -> String {
+    match Parameter::ALL.into_iter().find(|one| one.name() == budget.quantity) {
+        Some(parameter) => readable(parameter),
+        None => SPEED.to_owned(),
     }
 }
 
