@@ -85,7 +85,7 @@ fn law(
             "is \"log_normal\", which requires a value above 0, and {key} is {value}: set it to \"normal\" or \
              \"uniform\""
         );
-        return violations.add(format!("{table}.distribution"), message);
+        violations.add(format!("{table}.distribution"), message);
     }
 }
 

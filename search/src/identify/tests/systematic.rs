@@ -24,7 +24,7 @@ fn speeds_of_plate(realizations: &Realizations) -> Vec<RealizationResult> {
     let off = realizations.point.setup(&own).layers.bone_thickness - own.layers.bone_thickness;
     let mut solved = speeds(realizations);
     for one in &mut solved {
-        one.outcome = one.outcome.clone().map(|speed| speed * (1.0 + SLOPE * off));
+        one.outcome = one.outcome.map(|speed| speed * (1.0 + SLOPE * off));
     }
     solved
 }
