@@ -145,7 +145,7 @@ pub(crate) struct RunArguments {
     /// The live page.
     #[command(flatten)]
     pub(crate) page: RunPageOption,
-    /// Do not print what usual errors of the setup would move, where the job has no [systematic]
+    /// Do not print what usual errors of the setup would move, where the job says nothing of them
     #[arg(long)]
     pub(crate) no_budget: bool,
     /// Print the result as JSON
