@@ -50,16 +50,16 @@ pub struct Inference {
     pub parameters: Vec<(Parameter, DerivedQuantity)>,
     /// What makes the variances of the quantities that are known; empty if the job names nothing that is the
     /// same for all data and not known exactly.
-    pub budget: Vec<QuantityBudget>,
+    pub budget: Vec<VarianceBudget>,
 }
 
 /// The parts of the variance of a quantity.
 #[derive(Debug, Clone, PartialEq)]
-pub struct QuantityBudget {
+pub struct VarianceBudget {
     /// The quantity.
     pub quantity: BudgetQuantity,
     /// The parts, which add up to 1.
-    pub contributions: Vec<Contribution>,
+    pub contributions: Vec<VariancePart>,
 }
 
 /// A quantity whose variance is told by its parts.
@@ -73,7 +73,7 @@ pub enum BudgetQuantity {
 
 /// A part of a variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contribution {
+pub struct VariancePart {
     /// Where it comes from.
     pub source: BudgetSource,
     /// Its part of the whole variance, 0 to 1.

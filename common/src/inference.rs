@@ -51,9 +51,9 @@ pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
 pub use self::weights::{MomentWeights, OBSERVED_PARTS_MIN};
 pub use crate::conclusions::{
-    BudgetQuantity, BudgetSource, Conclusions, Contribution, DerivedQuantity, Direction, Inference,
-    NoiseErrors, Profile, QuantityBudget, Sensitivity, Solution, Solutions, Spread, Spreads,
-    Uncertainty,
+    BudgetQuantity, BudgetSource, Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors,
+    Profile, Sensitivity, Solution, Solutions, Spread, Spreads, Uncertainty, VarianceBudget,
+    VariancePart,
 };
 pub use crate::data_statistics::CONFIDENCE;
 

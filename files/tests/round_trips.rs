@@ -5,6 +5,10 @@
 mod fluids;
 #[path = "round_trips/random_bones.rs"]
 mod random_bones;
+#[path = "round_trips/random_scatter.rs"]
+mod random_scatter;
+#[path = "round_trips/uncertain_offset.rs"]
+mod uncertain_offset;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -25,10 +29,7 @@ use osteon_common::limits::SUBLAYERS_MAX;
 use osteon_common::moments::Moments;
 use osteon_common::parameters::{PARAMETERS, Parameter};
 use osteon_common::probe::{Probe, Receivers, Source};
-use osteon_common::random_quantities::{RandomDistribution, RandomQuantities, Scatter};
 use osteon_common::settings::{Extremum, Method, Picking, SolverSettings};
-use osteon_common::setup_quantity::SetupQuantity;
-use osteon_common::systematic::{Systematic, SystematicLaw, SystematicQuantity};
 use osteon_files::document::Format;
 use osteon_files::file_error::ContentError;
 use osteon_files::{case_file, job_file};
@@ -193,37 +194,6 @@ fn monte_carlo() -> impl Strategy<Value = MonteCarlo> {
     )
 }
 
-fn random() -> impl Strategy<Value = [(Option<f64>, RandomDistribution); 5]> {
-    let distribution = prop::sample::select(RandomDistribution::ALL.to_vec());
-    prop::array::uniform5((prop::option::of(0.001..0.08), distribution))
-}
-
-/// Makes quantities random, each by a share of its mean.
-fn scattered(
-    [thickness, quality, speed, tilt, porosity]: [(Option<f64>, RandomDistribution); 5],
-    setup: &Setup,
-) -> RandomQuantities {
-    let scatter = |(share, distribution): (Option<f64>, RandomDistribution), mean: f64| {
-        let share = share.filter(|share| share * mean > 0.0);
-        let deviation =
-            |share: f64| Scatter { standard_deviation: Some(share * mean), distribution };
-        share.map_or_else(Scatter::default, deviation)
-    };
-    let quality_factor = setup.layers.bone_attenuation.quality_factor;
-    RandomQuantities {
-        bone_thickness: scatter(thickness, setup.layers.bone_thickness),
-        // The smallest that is accepted is 2.
-        bone_quality_factor: scatter(quality, quality_factor.map_or(0.0, |mean| mean - 2.0)),
-        coupling_sound_speed: scatter(
-            speed,
-            SetupQuantity::CouplingSoundSpeed.value_in(setup).unwrap_or(0.0),
-        ),
-        probe_tilt: scatter(tilt, setup.probe.tilt),
-        porosity: scatter(porosity, setup.structure.porosity.unwrap_or(0.0)),
-        ..RandomQuantities::default()
-    }
-}
-
 fn search() -> impl Strategy<Value = Search> {
     let method = prop::sample::select(SearchMethod::ALL.to_vec());
     let numbers = (positive(), 0.0..1.0, 1e-300..0.5);
@@ -302,7 +272,7 @@ fn job() -> impl Strategy<Value = JobSpecification> {
         range(0.02, 0.3),
     );
     let objective = prop::sample::select(Objective::ALL.to_vec());
-    let settings = (random(), monte_carlo(), search(), objective, posterior());
+    let settings = (random_scatter::random(), monte_carlo(), search(), objective, posterior());
     let structure = prop_oneof![random_bones::structure(), random_bones::layered()];
     let setup = (setup(), prop::option::of(structure)).prop_map(|(setup, structure)| {
         random_bones::with_structure(setup, structure.unwrap_or_default())
@@ -314,7 +284,7 @@ fn job() -> impl Strategy<Value = JobSpecification> {
             if has_posterior && setup.structure.is_layered() {
                 setup.structure = BoneStructure::default();
             }
-            let random = scattered(random, &setup);
+            let random = random_scatter::scattered(random, &setup);
             let (rho, e_l, nu_l, g_l, e_t, nu_t, delta) = parameters;
             let mut parameters = Range::of_bone([rho, e_l, nu_l, g_l, e_t, nu_t, delta]);
             let also = rho.start().to_bits().is_multiple_of(2);
@@ -339,7 +309,8 @@ fn job() -> impl Strategy<Value = JobSpecification> {
             let objective = if searched { objective } else { Objective::Moments };
             let posterior = around_starts(posterior, &parameters).filter(|_| identification);
             let allowed = identification && search.sensitivities && !has_posterior;
-            let systematic = uncertain_offset(allowed, monte_carlo.max_failed_fraction);
+            let systematic =
+                uncertain_offset::uncertain_offset(allowed, monte_carlo.max_failed_fraction);
             let job = JobSpecification {
                 kind: KINDS[usize::from(!identification)],
                 setup,
@@ -355,17 +326,6 @@ fn job() -> impl Strategy<Value = JobSpecification> {
             job.with_implied(Omitted::default())
         },
     )
-}
-
-/// Returns an uncertain offset of the velocities, where the job allows any.
-fn uncertain_offset(allowed: bool, spread: f64) -> Systematic {
-    let mut systematic = Systematic::default();
-    if allowed {
-        let distribution = RandomDistribution::Uniform;
-        systematic.laws[SystematicQuantity::VelocityOffset as usize] =
-            SystematicLaw { spread: Some(spread), distribution, center: Some(0.0) };
-    }
-    systematic
 }
 
 /// A number of a specification, replaced by another.

@@ -5,7 +5,7 @@ use std::array;
 use super::linear::{Linear, NoiseResponse};
 use super::noise::{NORMAL, Noise};
 use super::systematic::{Effects, contributions, quadratic};
-use crate::conclusions::{BudgetQuantity, DerivedQuantity, QuantityBudget, Uncertainty};
+use crate::conclusions::{BudgetQuantity, DerivedQuantity, Uncertainty, VarianceBudget};
 use crate::data_statistics::{FewIntervals, intervals_of_data};
 use crate::ensemble::DISPERSION_MAX;
 use crate::job::{Data, JobSpecification, Range};
@@ -78,11 +78,11 @@ impl Quantities<'_> {
 
     /// Returns the parts of the variances of √(c1111/ρ) and of the free parameters, as far as these are known;
     /// none if everything but the data is known exactly.
-    pub(super) fn budget(&self, free: &[Parameter]) -> Vec<QuantityBudget> {
+    pub(super) fn budget(&self, free: &[Parameter]) -> Vec<VarianceBudget> {
         let Some(effects) = self.effects.filter(|effects| self.known && !effects.is_empty()) else {
             return Vec::new();
         };
-        let of = |quantity, gradient: &[f64]| QuantityBudget {
+        let of = |quantity, gradient: &[f64]| VarianceBudget {
             quantity,
             contributions: contributions(gradient, self.linear, self.noise, effects),
         };

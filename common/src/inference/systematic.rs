@@ -5,7 +5,7 @@ use std::array;
 use super::jacobian::changes;
 use super::linear::Linear;
 use super::noise::Noise;
-use crate::conclusions::{BudgetSource, Contribution};
+use crate::conclusions::{BudgetSource, VariancePart};
 use crate::job::JobSpecification;
 use crate::moments::{MOMENTS, MomentMatrix, MomentVector};
 use crate::results::{BestPoint, Evaluation};
@@ -91,7 +91,7 @@ pub(super) fn contributions(
     linear: &Linear,
     noise: &Noise,
     effects: &Effects,
-) -> Vec<Contribution> {
+) -> Vec<VariancePart> {
     let Some(response) = linear.response(gradient, &noise.covariance()) else { return Vec::new() };
     let transfer = response.transfer;
     let of_data = noise.data.map_or(0.0, |data| quadratic(&transfer, &data.covariance));
@@ -106,7 +106,7 @@ pub(super) fn contributions(
     if !(whole > 0.0 && whole.is_finite()) {
         return Vec::new();
     }
-    let share = |(source, variance)| Contribution { source, variance_share: variance / whole };
+    let share = |(source, variance)| VariancePart { source, variance_share: variance / whole };
     parts.into_iter().map(share).collect()
 }
 

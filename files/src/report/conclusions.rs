@@ -125,11 +125,11 @@ pub struct Contribution {
 
 /// Returns the budgets of all quantities that have one.
 pub(super) fn budget(found: &Inference) -> Vec<QuantityBudget> {
-    let contribution = |one: &osteon_common::inference::Contribution| Contribution {
+    let contribution = |one: &osteon_common::inference::VariancePart| Contribution {
         source: one.source.name().to_owned(),
         variance_share: one.variance_share,
     };
-    let budget = |one: &osteon_common::inference::QuantityBudget| QuantityBudget {
+    let budget = |one: &osteon_common::inference::VarianceBudget| QuantityBudget {
         quantity: one.quantity.name().to_owned(),
         contributions: one.contributions.iter().map(contribution).collect(),
     };
