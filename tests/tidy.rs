@@ -160,7 +160,7 @@ fn properties_are_tested_on_the_same_cases_everywhere() {
 }
 
 /// Names of types that are defined more than once, with the reason.
-const REPEATED_TYPE_NAMES: [(&str, &str); 17] = [
+const REPEATED_TYPE_NAMES: [(&str, &str); 19] = [
     ("Arguments", "the command line of each program"),
     ("Data", "a part of a job, and its JSON form in a result"),
     ("Direction", "a part of the conclusions, and its JSON form in a result"),
@@ -168,9 +168,11 @@ const REPEATED_TYPE_NAMES: [(&str, &str); 17] = [
     ("Event", "the events of the state machines of coordinator and worker"),
     ("Failure", "the failure of a solver and that of a worker, never in one file"),
     ("Group", "a group of the data, and the JSON form of its result"),
+    ("Lanes", "numbers computed together, of the solver and of the posterior"),
     ("MomentIntervals", "a part of the conclusions, and its JSON form in a result"),
     ("Moments", "the two moments, and their JSON form in a result"),
     ("Noise", "a part of the conclusions, and its JSON form in a result"),
+    ("Scaled", "scaled features of the posterior, and a scaled determinant of the solver"),
     ("Search", "a search, and the section of a job that configures it"),
     ("Settings", "the settings of each search method, named with their module"),
     ("Solution", "a part of the conclusions, and its JSON form in a result"),
