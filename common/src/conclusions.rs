@@ -7,7 +7,7 @@ use crate::moments::Moments;
 use crate::observables::ObservableValues;
 use crate::parameters::{Parameter, Point};
 use crate::posterior::Posterior;
-use crate::systematic::SystematicQuantity;
+use crate::shift::SystematicQuantity;
 
 /// Conclusions from one set of data: the parameters that it determines, and the points that match
 /// it.

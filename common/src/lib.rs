@@ -61,6 +61,7 @@ pub mod sampling;
 mod search_settings;
 pub mod settings;
 pub mod setup_quantity;
+pub mod shift;
 mod sobol;
 pub mod special;
 pub mod statistics;

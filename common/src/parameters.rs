@@ -11,7 +11,7 @@ use crate::elasticity::EngineeringConstants;
 use crate::ensemble::DISPERSION_MAX;
 use crate::limits::QUALITY_FACTOR_MIN;
 use crate::plausible::{self, PlausibleRange};
-use crate::systematic::{Shift, SystematicQuantity};
+use crate::shift::{Shift, SystematicQuantity};
 
 /// Number of all parameters.
 pub const PARAMETERS: usize = BONE_PARAMETERS + 6;

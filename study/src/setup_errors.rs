@@ -159,14 +159,13 @@ impl TrueSetup {
         let mut drawn = Self { setup: about.clone(), factor: 1.0, offset: 0.0 };
         for quantity in SystematicQuantity::ALL {
             let normal = standard_normal_quantile(generator.uniform());
-            let Some(law) = usual::law(quantity, about) else { continue };
-            let spread = law.spread.unwrap_or_default();
+            let Some((distribution, spread)) = usual::law(quantity, about) else { continue };
             let centre = match quantity {
                 SystematicQuantity::BoneQualityFactor => Some(usual::QUALITY_FACTOR),
                 _ => quantity.value_in(about),
             };
             let Some(centre) = centre else { continue };
-            let value = match law.distribution {
+            let value = match distribution {
                 RandomDistribution::LogNormal => centre * libm::exp(spread * normal),
                 _ => spread.mul_add(normal, centre),
             };

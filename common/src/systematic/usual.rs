@@ -1,9 +1,9 @@
 //! How far quantities of the setup usually are from what a job says: judgements, whose reasons and sources
 //! docs/how-to-systematic.md names.
 
-use super::{Shift, SystematicLaw, SystematicQuantity, Uncertain};
 use crate::case::Setup;
-use crate::random_quantities::RandomDistribution::{LogNormal, Normal};
+use crate::random_quantities::RandomDistribution::{self, LogNormal, Normal};
+use crate::shift::SystematicQuantity;
 
 /// Quality factor that a bone has whose job says nothing of losses: 4.5 dB/cm at 1 MHz and 4000 m/s.
 pub const QUALITY_FACTOR: f64 = 15.0;
@@ -11,23 +11,10 @@ pub const QUALITY_FACTOR: f64 = 15.0;
 /// Part of the mean porosity by which the difference of both sides is usually off.
 const GRADIENT_OF_MEAN: f64 = 0.5;
 
-/// Returns the usual uncertainty of a quantity that has this value in a setup; `None` where the setup has no
-/// such quantity.
-pub(super) fn uncertain(
-    quantity: SystematicQuantity,
-    value: Option<f64>,
-    setup: &Setup,
-) -> Option<Uncertain> {
-    if quantity == SystematicQuantity::BoneQualityFactor && value.is_none() {
-        let above = Shift { quantity, value: QUALITY_FACTOR };
-        return Some(Uncertain { quantity, below: None, above });
-    }
-    Some(Uncertain::about(quantity, law(quantity, setup)?.about(value?)?))
-}
-
-/// Returns the usual law of a quantity about its value in a setup; `None` where the setup has no such quantity.
-pub fn law(quantity: SystematicQuantity, setup: &Setup) -> Option<SystematicLaw> {
-    let (distribution, spread) = match quantity {
+/// Returns the usual law of a quantity about its value in a setup, and its spread, as those of a job; `None` where
+/// the setup has no such quantity.
+pub fn law(quantity: SystematicQuantity, setup: &Setup) -> Option<(RandomDistribution, f64)> {
+    Some(match quantity {
         SystematicQuantity::BoneThickness => (LogNormal, 0.1),
         SystematicQuantity::BoneQualityFactor => (LogNormal, 0.4),
         SystematicQuantity::CouplingSoundSpeed => (LogNormal, 0.03),
@@ -42,6 +29,5 @@ pub fn law(quantity: SystematicQuantity, setup: &Setup) -> Option<SystematicLaw>
             (Normal, GRADIENT_OF_MEAN * setup.structure.mean_porosity()?)
         }
         SystematicQuantity::VelocityOffset => (Normal, 10.0),
-    };
-    Some(SystematicLaw { spread: Some(spread), distribution, center: None })
+    })
 }
