@@ -103,6 +103,7 @@ pub enum IdentifyError<E> {
 /// use osteon_common::outcome::RealizationResult;
 /// use osteon_common::random_quantities::RandomQuantities;
 /// use osteon_common::results::Status;
+/// use osteon_common::systematic::Systematic;
 ///
 /// let mut parameters = Range::of_bone([1598.8, 0.0, 0.3816, 4.795e9, 9.8254e9, 0.4495, 0.0].map(Range::Fixed));
 /// parameters[1] = Range::Free { start: 15e9, lower: 12e9, upper: 25e9 };
@@ -113,6 +114,7 @@ pub enum IdentifyError<E> {
 ///     data: Some(Data::from_moments(3900.0, 0.03)),
 ///     parameters,
 ///     random: RandomQuantities::default(),
+///     systematic: Systematic::default(),
 ///     monte_carlo: MonteCarlo { realizations: 100, ..MonteCarlo::default() },
 ///     objective: Objective::Moments,
 ///     search: Search::default(),
