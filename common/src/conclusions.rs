@@ -48,8 +48,8 @@ pub struct Inference {
     /// The free parameters themselves; their uncertainty is known only if no direction is left
     /// free.
     pub parameters: Vec<(Parameter, DerivedQuantity)>,
-    /// What makes the variances of the quantities that are known; empty if the job names nothing that is the
-    /// same for all data and not known exactly.
+    /// For each quantity with an interval, the share of each source of error in its variance. Empty if the job has
+    /// no systematic errors.
     pub budget: Vec<VarianceBudget>,
 }
 
@@ -87,7 +87,7 @@ pub enum BudgetSource {
     Data,
     /// The finite number of realizations of the model.
     Sampling,
-    /// Something that is the same for all data and not known exactly.
+    /// A systematic error: a quantity of the setup that is not known exactly.
     Systematic(SystematicQuantity),
 }
 

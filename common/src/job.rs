@@ -111,7 +111,7 @@ pub struct JobSpecification {
     pub parameters: [Range; PARAMETERS],
     /// Scatter of quantities of the setup.
     pub random: RandomQuantities,
-    /// What is the same for all data and not known exactly.
+    /// Systematic errors: quantities of the setup that are not known exactly, and wrong in all data alike.
     pub systematic: Systematic,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,
@@ -128,7 +128,7 @@ pub struct JobSpecification {
 pub struct RunSettings {
     /// Scatter of quantities of the setup.
     pub random: RandomQuantities,
-    /// What is the same for all data and not known exactly.
+    /// Systematic errors: quantities of the setup that are not known exactly, and wrong in all data alike.
     pub systematic: Systematic,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,

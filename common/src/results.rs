@@ -330,7 +330,7 @@ pub struct BestPoint {
     pub cost: Option<f64>,
     /// Standard error of a likelihood's cost; `None` for other costs.
     pub cost_error: Option<f64>,
-    /// VariancePart of the priors to the cost; `None` if there is no prior.
+    /// Contribution of the priors to the cost; `None` if there is no prior.
     pub penalty: Option<f64>,
     /// Number of the first evaluation whose cost was within the range that sampling noise alone
     /// causes; `None` if there was none, and for costs that do not depend on the moments alone.

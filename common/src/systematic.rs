@@ -13,7 +13,7 @@ use crate::random_quantities::RandomDistribution;
 
 pub use crate::shift::{Shift, SystematicQuantity};
 
-/// What is known of a quantity.
+/// How well the job says that one quantity of the setup is known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SystematicLaw {
     /// How far the true value may be from the job's; 0: it is known exactly; `None`: the job does not say.
@@ -26,7 +26,7 @@ pub struct SystematicLaw {
     pub center: Option<f64>,
 }
 
-/// What is known of the quantities, independently of each other.
+/// How well the job says that the quantities of the setup are known. Their errors are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Systematic {
     /// Whether a quantity without a law of its own has the usual one.

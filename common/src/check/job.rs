@@ -19,7 +19,6 @@ use super::priors::priors;
 use super::range::range;
 use super::section::section;
 use super::setup::setup;
-
 use super::setup_parameters::{random_setup, setup_parameters};
 use super::systematic::systematic;
 use super::value::known_wrong;

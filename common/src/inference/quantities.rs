@@ -56,7 +56,7 @@ pub(super) struct Quantities<'a> {
     pub(super) ends: Option<LogarithmicEnds>,
     /// Whether intervals can be stated.
     pub(super) known: bool,
-    /// What is the same for all data moves; `None` if this is not known.
+    /// How far each systematic error moves the moments; `None` if one of these changes was not measured.
     pub(super) effects: Option<&'a Effects>,
 }
 

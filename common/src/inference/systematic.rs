@@ -1,4 +1,5 @@
-//! What quantities that are the same for all data move, and the part of each in the variance of a result.
+//! Systematic errors: how far an error of each uncertain quantity of the setup moves the moments, and which
+//! share of the variance of a result it causes.
 
 use std::array;
 
@@ -29,7 +30,7 @@ pub(super) fn effects(
                 let relative = one.above.value / specification.data.as_ref()?.moments(set).mean;
                 of_velocities([relative, -relative])
             }
-            _ => measured(&one, specification, set, best, history)?,
+            _ => half_difference(&one, specification, set, best, history)?,
         };
         effect.iter().all(|change| change.is_finite()).then_some((one.quantity, effect))
     };
@@ -38,7 +39,7 @@ pub(super) fn effects(
 
 /// Returns half the difference between one standard deviation above and below, or that from the best point
 /// where one of the two has no moments.
-fn measured(
+fn half_difference(
     uncertain: &Uncertain,
     specification: &JobSpecification,
     set: usize,

@@ -1,4 +1,4 @@
-//! What is the same for all data and not known exactly.
+//! Systematic errors: the section `[systematic]`.
 
 use osteon_common::job::JobKind;
 

@@ -1,4 +1,4 @@
-//! What is the same for all data and not known exactly, of random jobs.
+//! A systematic error, an uncertain offset of the velocities, for random jobs.
 
 use osteon_common::random_quantities::RandomDistribution;
 use osteon_common::systematic::{Systematic, SystematicLaw, SystematicQuantity};

@@ -31,7 +31,7 @@ fn speeds_of_plate(realizations: &Realizations) -> Vec<RealizationResult> {
 
 /// Velocities of `count` bones, measured on plates that are this much thicker (m) than the job says, by a
 /// device with this offset (m/s).
-fn measured(seed: u64, count: u64, (thicker, offset): (f64, f64)) -> Vec<f64> {
+fn draw_velocities(seed: u64, count: u64, (thicker, offset): (f64, f64)) -> Vec<f64> {
     let monte_carlo = MonteCarlo { realizations: count, seed, ..MonteCarlo::default() };
     let ensemble = Ensemble::drawn(&TRUTH, monte_carlo.germs()).unwrap();
     let mut point = TRUTH;
@@ -85,7 +85,7 @@ fn error(found: &Inference) -> f64 {
 #[test]
 fn what_all_data_share_does_not_shrink_with_their_number() {
     for count in [100, 4000] {
-        let velocities = measured(7, count, (0.0, 0.0));
+        let velocities = draw_velocities(7, count, (0.0, 0.0));
         let exact = found(&job(velocities.clone(), Systematic::default()));
         let mean = velocities.iter().sum::<f64>() / velocities.len() as f64;
         let own = error(&exact);
@@ -103,7 +103,7 @@ fn what_all_data_share_does_not_shrink_with_their_number() {
         };
         // Without a quantity the variance is less by the share of that.
         let by_thickness = share(BudgetSource::Systematic(SystematicQuantity::BoneThickness));
-        let without = found(&job(measured(7, count, (0.0, 0.0)), offset()));
+        let without = found(&job(draw_velocities(7, count, (0.0, 0.0)), offset()));
         let removed = 1.0 - (error(&without) / whole) * (error(&without) / whole);
         assert!((by_thickness - removed).abs() < 1e-3, "{count}: {by_thickness} {removed}");
         assert!(share(BudgetSource::Data) < 1.0);
@@ -121,7 +121,7 @@ fn intervals_hold_truths_of_other_setups() {
     for study in 0..STUDIES {
         let [thicker, offset, ..] = Germs::draw(99, study).values().map(standard_normal_quantile);
         let setup = (THICKNESS * thicker, OFFSET * offset);
-        let velocities = measured(1000 + study, 200, setup);
+        let velocities = draw_velocities(1000 + study, 200, setup);
         for (held, systematic) in held.iter_mut().zip([both(), Systematic::default()]) {
             let found = found(&job(velocities.clone(), systematic));
             let [low, high] = found.bulk_velocity.known.unwrap().interval;
