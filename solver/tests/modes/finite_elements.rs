@@ -33,6 +33,8 @@ pub(crate) struct FiniteElements {
     square: Mat<c64>,
     /// Inverse of the Cholesky factor of the mass.
     inverse: Mat<c64>,
+    /// Entries this far from the diagonal are zero.
+    bandwidth: usize,
 }
 
 impl FiniteElements {
@@ -40,15 +42,16 @@ impl FiniteElements {
         let nodes = 1 + degree * stack.iter().count();
         let zero = || Mat::<c64>::zeros(3 * nodes, 3 * nodes);
         let (mut mass, mut constant, mut linear, mut square) = (zero(), zero(), zero(), zero());
+        let (basis, weights) =
+            (basis(degree), gauss().into_iter().map(|(_, w)| w).collect::<Vec<_>>());
         // Upwards in x3; a function's number is that of its node, and the last of a sublayer the next's first.
         let upwards: Vec<&Sublayer> = stack.iter().collect();
         for (place, sublayer) in upwards.into_iter().rev().enumerate() {
             let (h, c) = (sublayer.thickness, &sublayer.solid.elasticity);
-            let basis = basis(degree);
             for (m, (value_m, slope_m)) in basis.iter().enumerate() {
                 for (n, (value_n, slope_n)) in basis.iter().enumerate() {
                     let sum = |a: &[f64], b: &[f64]| {
-                        a.iter().zip(b).zip(gauss()).map(|((a, b), (_, w))| a * b * w).sum::<f64>()
+                        a.iter().zip(b).zip(&weights).map(|((a, b), w)| a * b * w).sum::<f64>()
                     };
                     let (both, left) = (sum(value_m, value_n), sum(slope_m, value_n));
                     let (right, bend) = (sum(value_m, slope_n), sum(slope_m, slope_n));
@@ -69,7 +72,7 @@ impl FiniteElements {
         }
         let lower = mass.llt(Side::Lower).unwrap().L().to_owned();
         let inverse = lower.partial_piv_lu().solve(Mat::<c64>::identity(3 * nodes, 3 * nodes));
-        Self { mass, constant, linear, square, inverse }
+        Self { mass, constant, linear, square, inverse, bandwidth: 3 * degree + 2 }
     }
 
     /// Returns the stiffness at a wavenumber, rad/m.
@@ -92,6 +95,27 @@ impl FiniteElements {
     pub(crate) fn frequencies(&self, k: f64) -> Vec<f64> {
         let values = self.reduced(k).self_adjoint_eigenvalues(Side::Lower).unwrap();
         values.into_iter().map(|value| value.max(0.0).sqrt()).collect()
+    }
+
+    /// Returns how many waves at a wavenumber (rad/m) have a frequency below `omega` (rad/s): the negative pivots
+    /// of stiffness - omega² mass, by Sylvester's law of inertia.
+    pub(crate) fn count_below(&self, k: f64, omega: f64) -> usize {
+        let stiffness = self.stiffness(c64::from(k));
+        let size = self.mass.nrows();
+        let mut rest = Mat::from_fn(size, size, |i, j| {
+            stiffness[(i, j)] - self.mass[(i, j)] * (omega * omega)
+        });
+        for pivot in 0..size {
+            let last = (pivot + self.bandwidth).min(size - 1);
+            for j in pivot + 1..=last {
+                let factor = rest[(j, pivot)].conj() / rest[(pivot, pivot)].re;
+                for i in j..=last {
+                    let change = rest[(i, pivot)] * factor;
+                    rest[(i, j)] -= change;
+                }
+            }
+        }
+        (0..size).filter(|&i| rest[(i, i)].re < 0.0).count()
     }
 
     /// Returns the displacement of the wave at a wavenumber (rad/m) whose frequency is nearest to `omega`, of unit
