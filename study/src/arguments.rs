@@ -29,6 +29,8 @@ pub(crate) enum Study {
     Models(DrawsArguments),
     /// Measure the errors of the exact method for random layers, probes and bones
     Setups(DrawsArguments),
+    /// Compare both methods on bones of random sublayers, with random fluids, probes and pulses
+    Stacks(DrawsArguments),
     /// Measure jumps of the velocity between bones whose elasticity differs by 1e-9
     Continuity(DrawsArguments),
     /// Count the evaluations that each search method needs from ten starts with all seven

@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 pub mod accuracy;
+mod blocks;
 pub mod continuity;
 pub mod convergence;
 pub mod digest;
@@ -25,6 +26,7 @@ pub mod searches;
 pub mod setup_errors;
 pub mod setups;
 mod spread;
+pub mod stacks;
 mod table;
 pub mod twins;
 pub mod variance;

@@ -18,7 +18,8 @@ use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, digest,
-    failures, methods, models, porosities, refinement, searches, setup_errors, setups, variance,
+    failures, methods, models, porosities, refinement, searches, setup_errors, setups, stacks,
+    variance,
 };
 
 use crate::arguments::{
@@ -49,6 +50,8 @@ const SEARCHES: OverDraws =
     OverDraws { name: "searches", realizations: searches::REALIZATIONS, table: searches::table };
 const SETUPS: OverDraws =
     OverDraws { name: "setups", realizations: setups::REALIZATIONS, table: setups::table };
+const STACKS: OverDraws =
+    OverDraws { name: "stacks", realizations: stacks::REALIZATIONS, table: stacks::table };
 const DIGEST: OverDraws =
     OverDraws { name: "digest", realizations: digest::REALIZATIONS, table: digest::table };
 const CONTINUITY: OverDraws = OverDraws {
@@ -128,6 +131,7 @@ fn run_study(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::Digest(arguments) => run_over_draws(&DIGEST, arguments, isa),
         Study::Refinement(arguments) => run_over_draws(&REFINEMENT, arguments, isa),
         Study::Setups(arguments) => run_over_draws(&SETUPS, arguments, isa),
+        Study::Stacks(arguments) => run_over_draws(&STACKS, arguments, isa),
         Study::Searches(arguments) => run_over_draws(&SEARCHES, arguments, isa),
         Study::Continuity(arguments) => run_over_draws(&CONTINUITY, arguments, isa),
         Study::Variance(arguments) => run_over_seeds(arguments, isa),

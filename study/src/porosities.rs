@@ -15,8 +15,8 @@ use osteon_common::posterior::Posterior;
 use osteon_common::quantile::quantile;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::systematic::Systematic;
-use rayon::prelude::*;
 
+use crate::blocks::{Block, in_blocks};
 use crate::generator::Generator;
 use crate::identify::{RealizationCache, Surroundings, identify};
 use crate::table::{MarkdownTable, millimetres, two_digits};
@@ -56,8 +56,6 @@ const UNMODELLED: [([f64; 2], ProfileShape); 4] = [
 const THICKNESSES: [f64; 2] = [4e-3, 1.5e-3];
 /// Dispersion of the bones of [`unmodelled`].
 const DISPERSION: f64 = 0.1;
-/// Number of bones after which progress is reported.
-const BLOCK: usize = 20;
 
 /// Counts the 95 % intervals of porosity and dispersion that hold the truth, by the number of velocities, for
 /// bones whose porosity (3 to 25 %) and dispersion (0.05 to 0.2) are drawn uniformly.
@@ -66,17 +64,15 @@ const BLOCK: usize = 20;
 /// If a point has no ensemble, or an identification fails.
 pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let mut counts = [[IntervalCount::default(); 2]; COVERAGE_VELOCITIES.len()];
-    let blocks: Vec<u64> = (0..twins.repetitions).collect();
-    for block in blocks.chunks(BLOCK) {
-        let found: Result<Vec<_>, StudyError> =
-            block.par_iter().map(|&number| identify_bone(twins, number)).collect();
-        for found in found?.iter().flatten() {
+    for block in in_blocks(twins.repetitions, |number| identify_bone(twins, number)) {
+        let Block { done, found } = block?;
+        for found in &found {
             for (count, found) in counts.iter_mut().flatten().zip(found.iter().flatten()) {
                 count.add(found);
             }
         }
         let held = counts.map(|row| row.map(|count| (count.held, count.all)));
-        progress(&format!("{} bones: {held:?}", block.last().map_or(0, |last| last + 1)));
+        progress(&format!("{done} bones: {held:?}"));
     }
     let mut table = MarkdownTable::new(&[
         "velocities",
@@ -103,11 +99,8 @@ pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTabl
 pub fn profiles(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let mut held = [[0_u64; 2]; PROFILE_QUANTITIES.len()];
     let (mut all, mut unconverged, mut evaluations) = (0, 0, 0);
-    let numbers: Vec<u64> = (0..twins.repetitions).collect();
-    for block in numbers.chunks(BLOCK) {
-        let found: Result<Vec<_>, StudyError> =
-            block.par_iter().map(|&number| posterior_of_bone(twins, number)).collect();
-        for (truth, posterior) in found?.iter().flatten() {
+    for block in in_blocks(twins.repetitions, |number| posterior_of_bone(twins, number)) {
+        for (truth, posterior) in &block?.found {
             all += 1;
             unconverged += u64::from(!posterior.converged);
             evaluations += posterior.evaluations;

@@ -10,8 +10,8 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::random_quantities::{RandomDistribution, RandomQuantities};
 use osteon_common::special::standard_normal_quantile;
 use osteon_common::systematic::{Systematic, SystematicQuantity, usual};
-use rayon::prelude::*;
 
+use crate::blocks::{Block, in_blocks};
 use crate::generator::Generator;
 use crate::identify::{RealizationCache, Surroundings, identify};
 use crate::table::MarkdownTable;
@@ -35,8 +35,6 @@ const REALIZATIONS: u64 = 64;
 const FAILED_MAX: f64 = 0.05;
 /// Half the width of the 50 % interval in standard errors.
 const HALF: f64 = 0.674_489_750_196_081_7;
-/// Number of bones after which progress is reported.
-const BLOCK: usize = 10;
 
 /// How often intervals hold the truth.
 #[derive(Debug, Clone, Copy, Default)]
@@ -57,15 +55,13 @@ type Recovered = [(Option<DerivedQuantity>, f64); 2];
 /// If a point has no ensemble, or an identification fails.
 pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let mut held = [[[Held::default(); 2]; 2]; VELOCITIES.len()];
-    let numbers: Vec<u64> = (0..twins.repetitions).collect();
-    for block in numbers.chunks(BLOCK) {
-        let found: Result<Vec<_>, StudyError> =
-            block.par_iter().map(|&number| identify_bone(twins, number, &VELOCITIES)).collect();
-        for found in found?.iter().flatten() {
+    for block in in_blocks(twins.repetitions, |number| identify_bone(twins, number, &VELOCITIES)) {
+        let Block { done, found } = block?;
+        for found in &found {
             let places = held.iter_mut().flatten().flatten();
             places.zip(found.iter().flatten().flatten()).for_each(|(held, found)| held.add(found));
         }
-        progress(&format!("{} bones: {held:?}", block.last().map_or(0, |last| last + 1)));
+        progress(&format!("{done} bones: {held:?}"));
     }
     let mut table = MarkdownTable::new(&[
         "velocities",

@@ -331,7 +331,7 @@ fn attenuate(layers: &mut Layers, generator: &mut Generator, factors: [(f64, f64
 }
 
 /// Half of the means are the optimum's, made stiffer or softer; half are isotropic.
-fn point(generator: &mut Generator) -> Point {
+pub(crate) fn point(generator: &mut Generator) -> Point {
     let [_, e_l, nu_l, g_l, e_t, nu_t, ..] = OPTIMUM.0;
     let density = generator.between(1400.0, 2200.0);
     let stiffness = generator.decades(0.3, 2.0);
