@@ -49,7 +49,7 @@ pub struct MonteCarlo {
     /// Whether the moments are corrected by the control variate √(c1111/ρ), whose moments under the
     /// law are known.
     pub control_variate: bool,
-    /// Largest fraction of failures with which an evaluation is feasible; 0 to 1.
+    /// Largest fraction of failures of a feasible point, judged by the number of realizations; 0 to 1.
     pub max_failed_fraction: f64,
 }
 
@@ -113,7 +113,8 @@ impl Section for MonteCarlo {
             Key { name: "control_variate", meaning: control_variate },
             &mut self.control_variate,
         );
-        let max_failed = "a point with a larger share of failed realizations is infeasible";
+        let max_failed = "a point of a search is infeasible if its failed realizations are evidence (5 % level) that \
+                          more than this share of all fail; a propagation fails if more than this share of its own do";
         fields.number(
             Key { name: "max_failed_fraction", meaning: max_failed },
             &mut self.max_failed_fraction,

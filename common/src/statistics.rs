@@ -33,6 +33,9 @@ pub use self::observed::{
 };
 pub(crate) use self::sum::Sum;
 
+/// -ln 0.05: the evidence that makes a point infeasible.
+const EVIDENCE: f64 = 2.995_732_273_553_991;
+
 /// Returns mean and coefficient of variation (the paper's Secs. 2 and 5), or `None` for no
 /// velocity.
 ///
@@ -90,7 +93,8 @@ pub struct PointStatistics {
     pub moments: Option<Moments>,
     /// Means over the successes of the observables that were measured.
     pub observables: ObservableValues,
-    /// Whether at most the accepted fraction of realizations failed, and at least one succeeded.
+    /// Whether the failures are no evidence that more than the accepted fraction of all realizations fail, and
+    /// at least one succeeded.
     pub feasible: bool,
 }
 
@@ -102,15 +106,14 @@ impl PointStatistics {
     }
 
     /// Computes moments and feasibility from the outcomes of every index of an evaluation at
-    /// `point`. It is feasible if at least one realization succeeded and at most
-    /// `max_failed_fraction` of all failed.
+    /// `point`.
     pub fn from_outcomes(monte_carlo: &MonteCarlo, point: &Point, outcomes: &[Outcome]) -> Self {
         let failed = outcomes.iter().filter(|outcome| outcome.is_err()).count();
         let moments =
             Sample::from_outcomes(monte_carlo, point, outcomes).map(|sample| sample.moments());
-        let within = failed as f64 / outcomes.len() as f64 <= monte_carlo.max_failed_fraction;
+        let too_many = fails_more_often(failed, outcomes.len(), monte_carlo.max_failed_fraction);
         let observables = ObservableValues::default();
-        Self { moments, observables, feasible: moments.is_some() && within }
+        Self { moments, observables, feasible: moments.is_some() && !too_many }
     }
 
     /// Returns the paper's cost against the data's moments, to which each observable adds the square of
@@ -139,6 +142,21 @@ impl PointStatistics {
     pub fn compared(&self) -> Option<ComparedMoments> {
         Some(ComparedMoments { velocities: self.moments?, observables: self.observables })
     }
+}
+
+/// Returns whether `failed` of `all` realizations are evidence that more than a `fraction` of all fail. If just this
+/// fraction did, so many failures would have a probability below 5 %, by Chernoff's bound exp(-n D(k/n ‖ fraction))
+/// with the relative entropy D: one failure among 32 says little of a limit of 1 %, and 27 among 270 much.
+fn fails_more_often(failed: usize, all: usize, fraction: f64) -> bool {
+    let share = failed as f64 / all as f64;
+    if all == 0 || share <= fraction {
+        return false;
+    }
+    let part = |found: f64, limit: f64| {
+        if found == 0.0 { 0.0 } else { found * libm::log(found / limit) }
+    };
+    let entropy = part(share, fraction) + part(1.0 - share, 1.0 - fraction);
+    all as f64 * entropy > EVIDENCE
 }
 
 /// The outcomes of an evaluation, with the quantities derived from them.
@@ -322,9 +340,16 @@ mod tests {
         };
         check(0, 100, 0.0, true);
         check(1, 100, 0.0, false);
-        check(1, 100, 0.01, true);
-        check(2, 100, 0.01, false);
+        check(1, 32, 0.01, true);
+        check(2, 32, 0.01, true);
+        check(3, 32, 0.01, false);
+        check(4, 100, 0.01, true);
+        check(5, 100, 0.01, false);
         check(27, 2700, 0.01, true);
+        check(40, 2700, 0.01, true);
+        check(42, 2700, 0.01, false);
+        check(1_030, 100_000, 0.01, true);
+        check(1_100, 100_000, 0.01, false);
         check(99, 100, 1.0, true);
         check(100, 100, 1.0, false);
         check(0, 0, 1.0, false);

@@ -152,7 +152,8 @@ impl fmt::Display for Doubt {
             Self::Infeasible(infeasible, draws) => write!(
                 f,
                 "{infeasible} of the {draws} checked draws are infeasible, and draws like them are \
-                 part of the result: more than max_failed_fraction of their realizations fail; \
+                 part of the result: their failures are evidence that more than max_failed_fraction of \
+                 all realizations fail there; \
                  raise [monte_carlo] max_failed_fraction, which keeps them, or narrow the bounds"
             ),
         }

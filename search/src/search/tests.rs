@@ -205,6 +205,7 @@ fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
     let mut search = Search::new(Arc::new(specification(400)));
     let mut failed = outcomes(&specification(400).start()).to_vec();
     failed[2] = Err(FailureKind::NoArrival);
+    failed[3] = Err(FailureKind::NoArrival);
     while let Step::Evaluate(_) = search.ask() {
         search.tell(failed.clone().into(), ERRORS);
     }
@@ -212,7 +213,7 @@ fn too_many_failures_make_a_point_infeasible_and_the_job_say_why() {
     let reason = reason.unwrap();
     assert_eq!(status, Status::Failed);
     assert!(reason.contains("among the 3 evaluated"), "{reason}");
-    assert!(reason.contains("1 of 4 realizations failed (1 no_arrival)"), "{reason}");
+    assert!(reason.contains("2 of 4 realizations failed (2 no_arrival)"), "{reason}");
     assert_eq!(search.history()[0].cost, Some(f64::INFINITY));
     // A search whose points all failed has no best point, and the data determine nothing.
     assert_eq!(search.best(), None);

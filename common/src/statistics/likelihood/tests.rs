@@ -172,7 +172,7 @@ fn the_law_is_that_of_the_successes() {
     let without = cost(0.0, &with, &data);
     with.insert(17, Err(FailureKind::NoArrival));
     assert_eq!(cost(0.01, &with, &data), without);
-    assert_eq!(cost(0.004, &with, &data), f64::INFINITY);
+    assert_eq!(cost(0.0, &with, &data), f64::INFINITY);
     let error = |outcomes: &[Outcome]| {
         likelihood_error(&MonteCarlo::default(), &OPTIMUM, outcomes, &data).unwrap()
     };
