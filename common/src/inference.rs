@@ -33,18 +33,16 @@ mod tests;
 mod weights;
 
 use crate::job::{JobSpecification, Objective};
-use crate::moments::{ComparedMoments, MomentMatrix};
+use crate::moments::ComparedMoments;
 use crate::results::{BestPoint, Evaluation};
-use crate::statistics::{LikelihoodFit, likelihood_fit};
 
 use self::linear::Linear;
 use self::quantities::{LogarithmicEnds, Quantities};
 
-use self::agreement::compared;
-pub use self::agreement::{Agreement, agreement};
+use self::agreement::misfit;
+pub use self::agreement::{Agreement, ModelAtPoint, agreement};
 pub use self::conclusions::{below_noise_from, meaning};
 pub use self::jacobian::{Jacobian, jacobian};
-use self::noise::of_velocities;
 pub use self::noise::{DataNoise, Noise, data_noise, model_errors, noise};
 pub(crate) use self::noise::{PARTS_MIN, student_quantile};
 pub use self::profile::{PROFILE_POINTS, profiles};
@@ -66,34 +64,26 @@ pub fn inference(
     best: &BestPoint,
     history: &[Evaluation],
 ) -> Option<Inference> {
-    let estimate = best.velocity?;
     let data = specification.data.as_ref()?;
     let jacobian = jacobian(specification, set, best, history)?;
     let is_weighted =
         !jacobian.observables.is_empty() && specification.objective != Objective::Moments;
     let weights = if is_weighted { MomentWeights::of_data(data, set) } else { None };
     let linear = Linear::from_jacobian(&jacobian, weights.as_ref());
-    let model = ComparedMoments::of_estimates(&estimate, &best.observables);
-    let mut residual = model.differences(&data.compared(set)).map(|difference| -difference);
-    let mut noise = noise(data, set, &estimate, &best.observables);
+    let model = ModelAtPoint {
+        point: &best.point,
+        velocity: best.velocity.as_ref()?,
+        observables: &best.observables,
+        outcomes: &best.outcomes,
+    };
+    let misfit = misfit(specification, set, model)?;
+    let Agreement { matched, held, .. } = misfit.agreement(specification, set, &best.point);
+    let residual = misfit.differences.map(|difference| -difference);
+    let ends = if misfit.by_likelihood { None } else { LogarithmicEnds::of_data(data, set) };
     let effects = systematic::effects(specification, set, best, history);
-    noise.systematic = systematic::covariance(effects.as_ref().unwrap_or(&Vec::new()));
-    let mut ends = LogarithmicEnds::of_data(data, set);
-    if let Some(LikelihoodFit { residual: likely, covariance }) =
-        by_likelihood(specification, set, best)
-    {
-        residual[..2].copy_from_slice(&likely);
-        let covariance = match noise.data {
-            Some(found) => with_block(found.covariance, covariance),
-            None => of_velocities(covariance),
-        };
-        let freedom = data.set(set).map_or(1, |given| given.independent_count() as u64 - 1);
-        noise.data = Some(DataNoise { covariance, freedom });
-        ends = None;
-    }
+    let systematic = systematic::covariance(effects.as_ref().unwrap_or(&Vec::new()));
+    let noise = Noise { systematic, ..misfit.noise };
     let quantile = noise.quantile();
-    let Agreement { matched, held, .. } =
-        compared(specification, set, &best.point, residual, &noise);
     let context = Quantities {
         specification,
         best,
@@ -127,33 +117,6 @@ pub fn inference(
 /// Returns whether the data tell enough of their own noise for intervals.
 fn is_enough(noise: &Noise) -> bool {
     noise.data.is_some_and(|data| data.freedom + 1 >= PARTS_MIN)
-}
-
-/// Returns residual and covariance of the moments of the velocities by which these are most likely, if a
-/// likelihood was maximised; `None` if it was not, or has no maximum.
-fn by_likelihood(
-    specification: &JobSpecification,
-    set: usize,
-    best: &BestPoint,
-) -> Option<LikelihoodFit> {
-    if specification.objective != Objective::Likelihood {
-        return None;
-    }
-    let velocities = specification.data.as_ref()?.set(set)?;
-    let monte_carlo = &specification.monte_carlo;
-    likelihood_fit(monte_carlo, &best.point, &best.outcomes, &velocities)
-}
-
-/// Returns a covariance with another one of the moments of the velocities. The covariances with the
-/// observables change with it, so that their correlations stay.
-fn with_block(mut covariance: MomentMatrix, block: [[f64; 2]; 2]) -> MomentMatrix {
-    for (axis, row) in block.into_iter().enumerate() {
-        let factor = (row[axis] / covariance[axis][axis]).sqrt();
-        covariance[axis][2..].iter_mut().for_each(|with_other| *with_other *= factor);
-        covariance[2..].iter_mut().for_each(|row_of_other| row_of_other[axis] *= factor);
-        covariance[axis][..2].copy_from_slice(&row);
-    }
-    covariance
 }
 
 /// Returns the number of the first evaluation of a search from which on its lowest cost was below

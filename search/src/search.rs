@@ -8,7 +8,9 @@ use std::sync::Arc;
 
 use osteon_common::data_statistics::{FittedMoments, kolmogorov_test};
 use osteon_common::digest::PathDigest;
-use osteon_common::inference::{Agreement, Conclusions, agreement, below_noise_from, meaning};
+use osteon_common::inference::{
+    Agreement, Conclusions, ModelAtPoint, agreement, below_noise_from, meaning,
+};
 use osteon_common::job::{Data, JobKind, JobSpecification, Objective};
 use osteon_common::observables::ObservableSet;
 use osteon_common::outcome::FailureCounts;
@@ -377,9 +379,11 @@ impl Summary {
         let velocity = statistics::estimate(monte_carlo, &row.point, outcomes);
         let observables = statistics::observable_estimates(monte_carlo, outcomes);
         let set = row.role.group as usize;
-        let agreement = velocity
-            .as_ref()
-            .and_then(|velocity| agreement(specification, set, &row.point, velocity, &observables));
+        let agreement = velocity.as_ref().and_then(|velocity| {
+            let observables = &observables;
+            let model = ModelAtPoint { point: &row.point, velocity, observables, outcomes };
+            agreement(specification, set, model)
+        });
         // Moments that the search could not match are not fitted.
         let fitted = match (objective, agreement) {
             (Objective::Likelihood, _) | (_, Some(Agreement { matched: true, .. })) => {

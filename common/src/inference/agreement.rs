@@ -1,11 +1,13 @@
 //! Whether the model at a point matches the data, and whether a bound keeps it from matching better.
 
-use super::noise::{Noise, noise, normal_law_noise};
-use crate::job::{Data, JobSpecification};
-use crate::moments::{ComparedMoments, MOMENTS, MomentVector};
+use super::noise::{DataNoise, Noise, noise, normal_law_noise, of_velocities};
+use crate::job::{Data, JobSpecification, Objective};
+use crate::moments::{ComparedMoments, MOMENTS, MomentMatrix, MomentVector};
 use crate::observables::ObservableSet;
+use crate::outcome::Outcome;
 use crate::parameters::{Parameter, Point};
 use crate::results::{Estimate, ObservableEstimates};
+use crate::statistics::{LikelihoodFit, likelihood_fit};
 
 /// Relative difference below which moments always count as matched: no measurement is more
 /// accurate.
@@ -34,43 +36,116 @@ pub struct Agreement {
     pub held: bool,
 }
 
-/// Compares a model's `estimate`, and those of its observables, at `point` with set number `set` of the
-/// data; `None` without data.
+/// What the model says at a point.
+#[derive(Debug, Clone, Copy)]
+pub struct ModelAtPoint<'a> {
+    /// The point.
+    pub point: &'a Point,
+    /// Moments of its velocities.
+    pub velocity: &'a Estimate,
+    /// Means of its observables.
+    pub observables: &'a ObservableEstimates,
+    /// Its realizations.
+    pub outcomes: &'a [Outcome],
+}
+
+/// How far a model is from the data.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Misfit {
+    /// Differences of the compared moments, model minus data; of the velocities, those by which the model's
+    /// would be the likeliest, if a likelihood was maximised.
+    pub(super) differences: MomentVector,
+    /// Noise of these.
+    pub(super) noise: Noise,
+    /// Whether both are those of a likelihood's maximum.
+    pub(super) by_likelihood: bool,
+}
+
+/// Compares a model with set number `set` of the data; `None` without data. Errors of the setup do not
+/// count: they belong into the intervals, and excuse no difference.
 pub fn agreement(
     specification: &JobSpecification,
     set: usize,
-    point: &Point,
-    estimate: &Estimate,
-    observables: &ObservableEstimates,
+    model: ModelAtPoint<'_>,
 ) -> Option<Agreement> {
-    let data = specification.data.as_ref()?;
-    let noise = noise(data, set, estimate, observables);
-    let model = ComparedMoments::of_estimates(estimate, observables);
-    let differences = model.differences(&data.compared(set));
-    Some(compared(specification, set, point, differences, &noise))
+    Some(misfit(specification, set, model)?.agreement(specification, set, model.point))
 }
 
-/// Compares a model at `point`, given how far its moments are from those of the data, and their noise.
-pub(super) fn compared(
+/// Returns how far a model is from set number `set` of the data; `None` without data.
+pub(super) fn misfit(
     specification: &JobSpecification,
     set: usize,
-    point: &Point,
-    differences: MomentVector,
-    noise: &Noise,
-) -> Agreement {
-    let variances = variances(noise);
-    let limit = |axis: usize| (NEGLIGIBLE * NEGLIGIBLE * variances[axis]).max(EXACT * EXACT);
-    let is_met = (0..MOMENTS).all(|axis| differences[axis] * differences[axis] <= limit(axis));
-    let held = is_on_bound(specification, point) && !is_met;
-    let normal = specification.data.as_ref().filter(|_| held);
-    let counted = normal.map_or(variances, |data| at_most_normal(data, set, noise));
-    Agreement {
-        differences,
-        errors: noise.data.map(|_| counted.map(f64::sqrt)),
-        observables: specification.observables(),
-        matched: is_within(differences, counted),
-        held,
+    model: ModelAtPoint<'_>,
+) -> Option<Misfit> {
+    let data = specification.data.as_ref()?;
+    let moments = ComparedMoments::of_estimates(model.velocity, model.observables);
+    let mut found = Misfit {
+        differences: moments.differences(&data.compared(set)),
+        noise: noise(data, set, model.velocity, model.observables),
+        by_likelihood: false,
+    };
+    if let Some(LikelihoodFit { residual, covariance }) = by_likelihood(specification, set, model) {
+        found.differences[..2].copy_from_slice(&residual.map(|residual| -residual));
+        let covariance = match found.noise.data {
+            Some(noise) => with_block(noise.covariance, covariance),
+            None => of_velocities(covariance),
+        };
+        let freedom = data.set(set).map_or(1, |given| given.independent_count() as u64 - 1);
+        found.noise.data = Some(DataNoise { covariance, freedom });
+        found.by_likelihood = true;
     }
+    Some(found)
+}
+
+impl Misfit {
+    /// Returns whether the model at `point` matches set number `set` of the data.
+    pub(super) fn agreement(
+        &self,
+        specification: &JobSpecification,
+        set: usize,
+        point: &Point,
+    ) -> Agreement {
+        let Self { differences, noise, .. } = self;
+        let variances = variances(noise);
+        let limit = |axis: usize| (NEGLIGIBLE * NEGLIGIBLE * variances[axis]).max(EXACT * EXACT);
+        let is_met = (0..MOMENTS).all(|axis| differences[axis] * differences[axis] <= limit(axis));
+        let held = is_on_bound(specification, point) && !is_met;
+        let normal = specification.data.as_ref().filter(|_| held);
+        let counted = normal.map_or(variances, |data| at_most_normal(data, set, noise));
+        Agreement {
+            differences: *differences,
+            errors: noise.data.map(|_| counted.map(f64::sqrt)),
+            observables: specification.observables(),
+            matched: is_within(*differences, counted),
+            held,
+        }
+    }
+}
+
+/// Returns residual and covariance of the moments of the velocities by which these are most likely, if a
+/// likelihood was maximised; `None` if it was not, or has no maximum.
+fn by_likelihood(
+    specification: &JobSpecification,
+    set: usize,
+    model: ModelAtPoint<'_>,
+) -> Option<LikelihoodFit> {
+    if specification.objective != Objective::Likelihood {
+        return None;
+    }
+    let velocities = specification.data.as_ref()?.set(set)?;
+    likelihood_fit(&specification.monte_carlo, model.point, model.outcomes, &velocities)
+}
+
+/// Returns a covariance with another one of the moments of the velocities. The covariances with the
+/// observables change with it, so that their correlations stay.
+fn with_block(mut covariance: MomentMatrix, block: [[f64; 2]; 2]) -> MomentMatrix {
+    for (axis, row) in block.into_iter().enumerate() {
+        let factor = (row[axis] / covariance[axis][axis]).sqrt();
+        covariance[axis][2..].iter_mut().for_each(|with_other| *with_other *= factor);
+        covariance[2..].iter_mut().for_each(|row_of_other| row_of_other[axis] *= factor);
+        covariance[axis][..2].copy_from_slice(&row);
+    }
+    covariance
 }
 
 /// Returns whether the differences are within the noise.

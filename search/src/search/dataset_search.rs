@@ -2,7 +2,7 @@
 //! point.
 
 use osteon_common::ensemble::Germs;
-use osteon_common::inference::{MomentWeights, agreement, model_errors};
+use osteon_common::inference::{ModelAtPoint, MomentWeights, agreement, model_errors};
 use osteon_common::job::{JobSpecification, MonteCarlo, NoVariation, Objective, Range};
 use osteon_common::observables::ObservableValues;
 use osteon_common::outcomes::Outcomes;
@@ -389,22 +389,23 @@ impl DatasetSearch {
     }
 
     fn end(&mut self, specification: &JobSpecification) {
-        let estimated = self.best.as_ref().and_then(|Best { row, outcomes }| {
-            Some((row, estimate(&specification.monte_carlo, &row.point, outcomes)?))
+        let monte_carlo = &specification.monte_carlo;
+        let found = self.best.as_ref().and_then(|Best { row, outcomes }| {
+            let velocity = estimate(monte_carlo, &row.point, outcomes)?;
+            let observables = observable_estimates(monte_carlo, outcomes);
+            let model = ModelAtPoint {
+                point: &row.point,
+                velocity: &velocity,
+                observables: &observables,
+                outcomes,
+            };
+            let errors = model_errors(&self.data, &velocity, &observables);
+            Some((agreement(specification, self.set as usize, model), errors))
         });
-        let observables = self
-            .best_outcomes()
-            .map(|best| observable_estimates(&specification.monte_carlo, best))
-            .unwrap_or_default();
-        let agreement = estimated.as_ref().and_then(|(row, estimate)| {
-            agreement(specification, self.set as usize, &row.point, estimate, &observables)
-        });
-        let errors = estimated
-            .as_ref()
-            .map(|(_, estimate)| model_errors(&self.data, estimate, &observables));
+        let (agreement, errors) = found.unzip();
         let evidence = reasons::Evidence {
             best: self.best(),
-            agreement,
+            agreement: agreement.flatten(),
             trials: self.trials,
             first: self.first.as_ref(),
             evaluations: self.evaluations,

@@ -112,7 +112,8 @@ fn settled(evidence: &Evidence<'_>, specification: &JobSpecification) -> (Status
     // How far off a compromise may be is unknown without the noise of the data, unless a bound holds
     // it back.
     let is_free = agreement.errors.is_none() && bounds.is_empty();
-    if is_compromise(specification) && (agreement.matched || is_free) {
+    let is_held = agreement.held && !bounds.is_empty();
+    if is_compromise(specification) && (agreement.matched || is_free) && !is_held {
         return (Status::Converged, None);
     }
     let misfit = misfit(best, agreement, specification);
