@@ -12,11 +12,13 @@
 //! has a small unknown probability of coming from a broad law instead (`contamination.rs`).
 
 mod contamination;
+mod correlated;
 mod random_effects;
 #[cfg(test)]
 mod tests;
 
 use self::contamination::{Contamination, log_of_sum};
+use self::correlated::CorrelatedErrors;
 use self::random_effects::{SubjectClass, Subjects};
 use crate::data_statistics::rounding;
 use crate::moments::Moments;
@@ -44,6 +46,8 @@ pub const MODEL_ERROR_MAX: f64 = 6.0;
 /// Distance from the data's moments, in units of their errors, beyond which the likelihood is
 /// negligible.
 const FAR: f64 = 15.0;
+/// The same where the model's moments have a much wider law, whose density hardly changes over so few errors.
+const REACH: f64 = 5.0;
 /// Rounding that adds less than this share of the variance is negligible.
 const ROUNDING: f64 = 1e-3;
 /// Errors of the model's moments below this fraction of the data's are negligible.
@@ -61,11 +65,22 @@ pub struct DataLikelihood {
     subjects: Subjects,
     /// Velocities that may be wrong, which are not among those of the subjects; `None` if there are none.
     contamination: Option<Contamination>,
-    /// Relative standard errors of the model's moments.
+    /// Relative standard errors of the model's moments by sampling.
     model: [f64; 2],
-    /// Errors of the model's moments, over which the likelihood is averaged: differences of both
-    /// logarithms, and logarithms of their weights. A single zero if the model is exact.
-    model_errors: Vec<([f64; 2], f64)>,
+    /// Covariance of their relative errors by the setup; `None` if this is known exactly.
+    systematic: Option<[[f64; 2]; 2]>,
+    /// Errors of the model's moments over which the likelihood is averaged.
+    model_errors: ModelErrors,
+}
+
+/// Errors of the model's moments.
+#[derive(Debug, Clone, PartialEq)]
+enum ModelErrors {
+    /// Those of sampling: differences of both logarithms, and logarithms of their weights. A single zero if
+    /// the model is exact.
+    Sampling(Vec<([f64; 2], f64)>),
+    /// Those of sampling and of the setup.
+    WithSystematic(CorrelatedErrors),
 }
 
 impl DataLikelihood {
@@ -137,28 +152,51 @@ impl DataLikelihood {
             subjects,
             contamination: None,
             model: [0.0; 2],
-            model_errors: vec![([0.0; 2], 0.0)],
+            systematic: None,
+            model_errors: ModelErrors::Sampling(vec![([0.0; 2], 0.0)]),
         })
     }
 
     /// Returns the likelihood of a model whose moments have these relative standard errors, which
     /// are the same at every point, as common germs make them: its average over normal errors.
+    #[must_use]
     pub fn with_model_errors(self, errors: [f64; 2]) -> Self {
-        let noise = self.errors();
-        let [of_mean, of_variation] = [0, 1].map(|axis| normal_nodes(errors[axis] / noise[axis]));
-        let pairs = of_mean.iter().flat_map(|mean| {
-            of_variation.iter().map(move |variation| {
-                let steps = [mean.0 * errors[0], variation.0 * errors[1]];
-                (steps, libm::log(mean.1 * variation.1))
-            })
-        });
-        Self { model_errors: pairs.collect(), model: errors, ..self }
+        let model_errors = match self.systematic {
+            None => ModelErrors::Sampling(sampling_errors(errors, self.errors())),
+            Some(mut covariance) => {
+                (0..2).for_each(|k| covariance[k][k] += errors[k] * errors[k]);
+                let (noise, widest) = (self.errors(), self.errors_of([self.subjects.count(); 2]));
+                let reach = REACH * f64::max(widest[0] / noise[0], widest[1] / noise[1]);
+                let data = (self.moments(), noise);
+                ModelErrors::WithSystematic(CorrelatedErrors::new(covariance, data, reach))
+            }
+        };
+        Self { model_errors, model: errors, ..self }
+    }
+
+    /// Returns the likelihood of a model whose setup is not known exactly, which gives its moments relative
+    /// errors with this covariance: its average over these, as a normal law.
+    #[must_use]
+    pub fn with_systematic(self, covariance: [[f64; 2]; 2]) -> Self {
+        let sampling = self.model;
+        Self { systematic: Some(covariance), ..self }.with_model_errors(sampling)
     }
 
     /// Returns the logarithm of the likelihood of a model with this logarithm of the mean (m/s) and
     /// of the coefficient of variation, up to a constant, nats.
-    pub fn log(&self, [mean, variation]: [f64; 2]) -> f64 {
-        let of = |(step, weight): &([f64; 2], f64)| {
+    pub fn log(&self, at: [f64; 2]) -> f64 {
+        match &self.model_errors {
+            ModelErrors::Sampling(errors) => self.average(at, errors.iter().copied()),
+            ModelErrors::WithSystematic(errors) => self.average(at, errors.nodes(at).into_iter()),
+        }
+    }
+
+    fn average(
+        &self,
+        [mean, variation]: [f64; 2],
+        errors: impl ExactSizeIterator<Item = ([f64; 2], f64)>,
+    ) -> f64 {
+        log_of_sum(errors.map(|(step, weight)| {
             let mean = libm::exp(mean + step[0]);
             let deviation = mean * libm::exp(variation + step[1]);
             let variance = deviation * deviation;
@@ -166,8 +204,7 @@ impl DataLikelihood {
                 contamination.log(mean - self.centre, variance + self.instrument)
             });
             weight + contaminated + self.subjects.log(mean - self.centre, variance, self.instrument)
-        };
-        log_of_sum(self.model_errors.iter().map(of))
+        }))
     }
 
     /// Returns what the data say about wrong velocities among them, given the logarithms of the
@@ -196,11 +233,20 @@ impl DataLikelihood {
         self.errors_of(counts)
     }
 
+    /// Returns the standard errors of the moments by the setup.
+    pub fn systematic_errors(&self) -> [f64; 2] {
+        self.systematic.map_or([0.0; 2], |found| [0, 1].map(|k| found[k][k].sqrt()))
+    }
+
     /// Returns the distances from the moments beyond which the likelihood is negligible: each
     /// subject may count once only, and the model has its own errors.
     pub fn extent(&self) -> [f64; 2] {
-        let errors = self.errors_of([self.subjects.count(); 2]);
-        [0, 1].map(|k| FAR * errors[k].mul_add(errors[k], self.model[k] * self.model[k]).sqrt())
+        let (errors, systematic) =
+            (self.errors_of([self.subjects.count(); 2]), self.systematic_errors());
+        [0, 1].map(|k| {
+            let of_model = self.model[k] * self.model[k] + systematic[k] * systematic[k];
+            FAR * errors[k].mul_add(errors[k], of_model).sqrt()
+        })
     }
 
     /// Returns the errors of a sample with as much information on the mean and on the variance as
@@ -215,6 +261,19 @@ impl DataLikelihood {
     fn total(&self) -> f64 {
         self.deviation * self.deviation + self.instrument
     }
+}
+
+/// Returns the errors over which a likelihood of data with this `noise` is averaged, and the logarithms of their
+/// weights, given their standard deviations.
+fn sampling_errors(errors: [f64; 2], noise: [f64; 2]) -> Vec<([f64; 2], f64)> {
+    let [of_mean, of_variation] = [0, 1].map(|axis| normal_nodes(errors[axis] / noise[axis]));
+    let pairs = of_mean.iter().flat_map(|mean| {
+        of_variation.iter().map(move |variation| {
+            let steps = [mean.0 * errors[0], variation.0 * errors[1]];
+            (steps, libm::log(mean.1 * variation.1))
+        })
+    });
+    pairs.collect()
 }
 
 /// Returns nodes and weights of the average over a normal error, in units of its standard deviation,

@@ -47,6 +47,7 @@ pub use self::noise::{DataNoise, Noise, data_noise, model_errors, noise};
 pub(crate) use self::noise::{PARTS_MIN, student_quantile};
 pub use self::profile::{PROFILE_POINTS, profiles};
 pub use self::solutions::{solutions, spread};
+pub use self::systematic::systematic_covariance;
 pub use self::weights::{MomentWeights, OBSERVED_PARTS_MIN};
 pub use crate::conclusions::{
     BudgetQuantity, BudgetSource, Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors,
@@ -70,17 +71,12 @@ pub fn inference(
         !jacobian.observables.is_empty() && specification.objective != Objective::Moments;
     let weights = if is_weighted { MomentWeights::of_data(data, set) } else { None };
     let linear = Linear::from_jacobian(&jacobian, weights.as_ref());
-    let model = ModelAtPoint {
-        point: &best.point,
-        velocity: best.velocity.as_ref()?,
-        observables: &best.observables,
-        outcomes: &best.outcomes,
-    };
+    let model = ModelAtPoint::of_best(best)?;
     let misfit = misfit(specification, set, model)?;
     let Agreement { matched, held, .. } = misfit.agreement(specification, set, &best.point);
     let residual = misfit.differences.map(|difference| -difference);
     let ends = if misfit.by_likelihood { None } else { LogarithmicEnds::of_data(data, set) };
-    let effects = systematic::effects(specification, set, best, history);
+    let effects = systematic::effects(specification, set, model, history);
     let systematic = systematic::covariance(effects.as_ref().unwrap_or(&Vec::new()));
     let noise = Noise { systematic, ..misfit.noise };
     let quantile = noise.quantile();

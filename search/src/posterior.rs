@@ -38,7 +38,7 @@ mod surrogate;
 #[cfg(test)]
 mod tests;
 
-use osteon_common::inference::model_errors;
+use osteon_common::inference::{ModelAtPoint, model_errors};
 use osteon_common::job::JobSpecification;
 use osteon_common::posterior::Posterior;
 use osteon_common::results::{BestPoint, ComparedMoments, Evaluation};
@@ -61,13 +61,22 @@ pub(crate) fn posterior(
     let known = rows()
         .filter(|row| !row.role.posterior)
         .filter_map(|row| Some((row.point, feasible_moments(row)?)));
-    let likelihood = SetLikelihood::new(specification, set);
+    let (data, best) = (specification.data.as_ref()?, best?);
+    let model = ModelAtPoint {
+        point: &best.point,
+        velocity: best.velocity.as_ref()?,
+        observables: &best.observables,
+        outcomes: &best.outcomes,
+    };
+    let likelihood = match SetLikelihood::new(specification, set) {
+        Some(found) => Some(found.with_systematic(specification, set, model, history)?),
+        None => None,
+    };
     let mut search = PosteriorSearch::new(&specification.of_set(set), likelihood, known);
     for row in rows().filter(|row| row.role.posterior) {
         search.tell(feasible_moments(row));
     }
-    let (data, best) = (specification.data.as_ref()?, best?);
-    let errors = model_errors(&data.compared(set), &best.velocity?, &best.observables);
+    let errors = model_errors(&data.compared(set), model.velocity, model.observables);
     let found = search.result(specification, errors)?;
     let predictive_p_value = summary::predictive_p_value(specification, set, best, &found);
     Some(Posterior { predictive_p_value, ..found })

@@ -181,6 +181,11 @@ impl ServedJob {
         let realizations = config.realizations.unwrap_or(settings.realizations);
         let kept = self.kept((set, seed, realizations));
         let density = kept.get_or_try_init(|| async {
+            if !self.specification.systematic.is_empty() {
+                return Err(ProtocolError::input(
+                    "the posterior by UM-Bridge takes the setup as exactly known; leave [systematic] out of the job",
+                ));
+            }
             let density = PosteriorDensity::new(&self.specification, set).ok_or_else(|| {
                 ProtocolError::input("these data have no likelihood: their noise is not known")
             })?;

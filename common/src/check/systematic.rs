@@ -21,8 +21,13 @@ pub(super) fn systematic(specification: &JobSpecification, violations: &mut Viol
     if checked.is_empty() || known_wrong(Systematic::KEY.name, violations) {
         return;
     }
-    if specification.posterior.is_some() {
-        let message = "is not regarded by a posterior; leave one of them out";
+    if specification.posterior.is_some() && !specification.observables().is_empty() {
+        let message = "is not regarded by a posterior of more than velocities; leave out [posterior], or the \
+                       other columns of [data]";
+        return violations.add(Systematic::KEY.name, message);
+    }
+    if !specification.is_searched() {
+        let message = "needs the best point of a search, and search.method is \"posterior\"; set it to \"newton\"";
         return violations.add(Systematic::KEY.name, message);
     }
     if !specification.search.sensitivities {

@@ -179,6 +179,40 @@ fn large_errors_of_the_model_are_averaged_over() {
     }
 }
 
+/// Two normal laws, one after the other, are a normal law, also if the second is correlated, much wider than the
+/// first, or both in turn.
+#[test]
+fn errors_of_the_setup_are_averaged_over() {
+    let exact = DataLikelihood::independent(&normal(2, 20_000), 0.0).unwrap();
+    let (noise, centre) = (exact.errors(), exact.moments());
+    for (effects, sampling) in [
+        (&[[20.0, 0.0]][..], 0.0),
+        (&[[3.0, -4.0]], 0.0),
+        (&[[0.3, 0.2]], 0.5),
+        (&[[20.0, 5.0], [2.0, -1.0]], 1.0),
+        (&[[90.0, -30.0], [10.0, 40.0], [0.1, 0.2]], 0.2),
+    ] {
+        let sum = |i: usize, j: usize| effects.iter().map(|one| one[i] * one[j]).sum::<f64>();
+        let scaled = [0, 1].map(|i| [0, 1].map(|j| noise[i] * noise[j] * sum(i, j)));
+        let blurred = exact.clone().with_model_errors(noise.map(|error| sampling * error));
+        let blurred = blurred.with_systematic(scaled);
+        let own = 1.0 + sampling * sampling;
+        let (a, b, c) = (own + sum(0, 0), sum(0, 1), own + sum(1, 1));
+        for [x, y] in [[1.0, 0.0], [0.0, 1.5], [1.5, 1.5], [-2.0, 1.0]] {
+            let [x, y] = [x * a.sqrt(), y * c.sqrt()];
+            let off = [centre[0] + x * noise[0], centre[1] + y * noise[1]];
+            let expected = 0.5 * (c * x * x - 2.0 * b * x * y + a * y * y) / (a * c - b * b);
+            let found = blurred.log(centre) - blurred.log(off);
+            // The law of the data's own moments is not quite normal far from them.
+            let error = (found - expected).abs();
+            assert!(
+                expected > 10.0 || error < 0.02 + 0.05 * expected,
+                "{effects:?}, {x}, {y}: {found} {expected}"
+            );
+        }
+    }
+}
+
 /// Compares with the average over many errors of the model's mean, of the size of the data's.
 #[test]
 fn errors_of_the_model_are_averaged_over() {

@@ -6,7 +6,7 @@ use crate::moments::{ComparedMoments, MOMENTS, MomentMatrix, MomentVector};
 use crate::observables::ObservableSet;
 use crate::outcome::Outcome;
 use crate::parameters::{Parameter, Point};
-use crate::results::{Estimate, ObservableEstimates};
+use crate::results::{BestPoint, Estimate, ObservableEstimates};
 use crate::statistics::{LikelihoodFit, likelihood_fit};
 
 /// Relative difference below which moments always count as matched: no measurement is more
@@ -47,6 +47,18 @@ pub struct ModelAtPoint<'a> {
     pub observables: &'a ObservableEstimates,
     /// Its realizations.
     pub outcomes: &'a [Outcome],
+}
+
+impl<'a> ModelAtPoint<'a> {
+    /// Returns what it says at a best point; `None` if no realization succeeded there.
+    pub(super) fn of_best(best: &'a BestPoint) -> Option<Self> {
+        Some(Self {
+            point: &best.point,
+            velocity: best.velocity.as_ref()?,
+            observables: &best.observables,
+            outcomes: &best.outcomes,
+        })
+    }
 }
 
 /// How far a model is from the data.

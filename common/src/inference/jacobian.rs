@@ -1,5 +1,6 @@
 //! Derivatives of the compared moments, from differences on common germs.
 
+use super::agreement::ModelAtPoint;
 use crate::conclusions::Sensitivity;
 use crate::job::{JobSpecification, Range};
 use crate::moments::{MomentVector, log_ratios, moment_vector};
@@ -27,6 +28,7 @@ pub fn jacobian(
     history: &[Evaluation],
 ) -> Option<Jacobian> {
     let observables = specification.data.as_ref()?.compared(set).observables.which();
+    let model = ModelAtPoint::of_best(best)?;
     let mut jacobian = Jacobian { free: Vec::new(), columns: Vec::new(), observables };
     for parameter in Parameter::ALL {
         let range = specification.range(parameter);
@@ -37,7 +39,7 @@ pub fn jacobian(
         let row = history.iter().find(varied)?;
         let at = |point: &Point| range.coordinate(point.get(parameter));
         let step = at(&row.point)? - at(&best.point)?;
-        let column = changes(specification, set, best, row)?.map(|change| change / step);
+        let column = changes(specification, set, model, row)?.map(|change| change / step);
         if !column.iter().all(|slope| slope.is_finite()) {
             return None;
         }
@@ -47,16 +49,16 @@ pub fn jacobian(
     (!jacobian.free.is_empty()).then_some(jacobian)
 }
 
-/// Returns the changes of the compared moments from the best point to an evaluation on the same germs; `None`
+/// Returns the changes of the compared moments from a point to an evaluation on the same germs; `None`
 /// without moments. An observable that is not known is not a number.
 pub(super) fn changes(
     specification: &JobSpecification,
     set: usize,
-    best: &BestPoint,
+    model: ModelAtPoint<'_>,
     row: &Evaluation,
 ) -> Option<MomentVector> {
-    let base = best.velocity?.moments;
-    let means = best.observables.map(|found| found.map(|found| found.mean));
+    let base = model.velocity.moments;
+    let means = model.observables.map(|found| found.map(|found| found.mean));
     let of_data = specification.data.as_ref()?.compared(set).observables;
     Some(moment_vector(log_ratios(row.moments?, base), |one| match of_data[one] {
         Some(measured) => {

@@ -3,23 +3,35 @@
 
 use std::array;
 
+use super::agreement::ModelAtPoint;
 use super::jacobian::changes;
 use super::linear::Linear;
 use super::noise::Noise;
 use crate::conclusions::{BudgetSource, VariancePart};
 use crate::job::JobSpecification;
 use crate::moments::{MOMENTS, MomentMatrix, MomentVector};
-use crate::results::{BestPoint, Evaluation};
+use crate::results::Evaluation;
 use crate::systematic::{Shift, SystematicQuantity, Uncertain};
 
 /// Changes of the compared moments by one standard deviation of each quantity.
 pub(super) type Effects = Vec<(SystematicQuantity, MomentVector)>;
 
+/// Returns the covariance of the compared moments by the setup at the best point of set number `set`, given the
+/// evaluations of shifted setups; `None` if an effect was not measured.
+pub fn systematic_covariance(
+    specification: &JobSpecification,
+    set: usize,
+    best: ModelAtPoint<'_>,
+    shifted: &[Evaluation],
+) -> Option<MomentMatrix> {
+    effects(specification, set, best, shifted).as_ref().map(covariance)
+}
+
 /// Returns the effects at the best point of set number `set`; `None` if one was not measured.
 pub(super) fn effects(
     specification: &JobSpecification,
     set: usize,
-    best: &BestPoint,
+    best: ModelAtPoint<'_>,
     history: &[Evaluation],
 ) -> Option<Effects> {
     let setup = best.point.setup(&specification.setup);
@@ -43,7 +55,7 @@ fn half_difference(
     uncertain: &Uncertain,
     specification: &JobSpecification,
     set: usize,
-    best: &BestPoint,
+    best: ModelAtPoint<'_>,
     history: &[Evaluation],
 ) -> Option<MomentVector> {
     let setup = best.point.setup(&specification.setup);

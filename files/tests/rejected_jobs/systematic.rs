@@ -27,14 +27,14 @@ fn systematic() {
 }
 
 #[test]
-fn it_needs_derivatives_and_is_not_for_a_posterior() {
+fn it_needs_a_search_and_its_derivatives() {
     let thickness = "bone_thickness = { spread = 0.1e-3 }";
     let without = edited("", &format!("\n[systematic]\n{thickness}\n"));
     let refused = refusal(&without, JobKind::Identification);
     assert!(refused.contains("search.sensitivities is false; leave one of them out"), "{refused}");
-    let with = edited(WITHOUT, &format!("[systematic]\n{thickness}\n\n[posterior]\n"));
+    let with = edited(WITHOUT, &format!("method = \"posterior\"\n\n[systematic]\n{thickness}\n"));
     let refused = refusal(&with, JobKind::Identification);
-    assert!(refused.contains("is not regarded by a posterior; leave one of them out"), "{refused}");
+    assert!(refused.contains("needs the best point of a search"), "{refused}");
 }
 
 #[test]

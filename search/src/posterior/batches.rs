@@ -54,6 +54,8 @@ pub(crate) enum SearchOutcome {
     Doubtful(String),
     /// No parameter set within the bounds and the priors comes near the data.
     NothingMatches,
+    /// The effect of a systematic error was not measured.
+    UnknownEffect,
 }
 
 /// A point that is to be evaluated.

@@ -1,10 +1,11 @@
 //! The likelihood of one set of data as a function of the compared moments of a model.
 
 use osteon_common::data_likelihood::DataLikelihood;
-use osteon_common::inference::MomentWeights;
+use osteon_common::inference::{ModelAtPoint, MomentWeights, systematic_covariance};
 use osteon_common::job::{JobSpecification, Measurements};
 use osteon_common::moments::{ComparedMoments, MOMENTS, MomentVector, Moments};
 use osteon_common::observables::ObservableSet;
+use osteon_common::results::Evaluation;
 
 /// The likelihood of the velocities, times that of the means of the other observables given the
 /// velocities.
@@ -48,6 +49,25 @@ impl SetLikelihood {
         Some(Self { velocities, observables, data: compared })
     }
 
+    /// Returns the likelihood of a model whose setup is not known exactly: its average over the errors of the
+    /// velocities' moments that the evaluations of `shifted` setups show, to first order about `best`. `None` if
+    /// one was not measured. Jobs with a posterior have systematic errors only without other observables.
+    pub(crate) fn with_systematic(
+        self,
+        specification: &JobSpecification,
+        set: usize,
+        best: ModelAtPoint<'_>,
+        shifted: &[Evaluation],
+    ) -> Option<Self> {
+        let covariance = systematic_covariance(specification, set, best, shifted)?;
+        let [[mean, both, ..], [_, variation, ..], ..] = covariance;
+        if mean == 0.0 && variation == 0.0 {
+            return Some(self);
+        }
+        let velocities = self.velocities.with_systematic([[mean, both], [both, variation]]);
+        Some(Self { velocities, ..self })
+    }
+
     /// Returns the likelihood of a model whose moments have these relative standard errors, which are the
     /// same at every point, as common germs make them: its average over normal errors.
     #[must_use]
@@ -77,11 +97,14 @@ impl SetLikelihood {
         self.data.observables.which()
     }
 
-    /// Returns rough standard errors of the data's moments, of the observables given the velocities, as a
-    /// measure of misfit; infinite of an observable that was not measured.
+    /// Returns rough standard errors of the data's moments with those of the setup, of the observables given the
+    /// velocities, as a measure of misfit; infinite of an observable that was not measured.
     pub(super) fn errors(&self) -> MomentVector {
         let mut errors = [f64::INFINITY; MOMENTS];
-        errors[..2].copy_from_slice(&self.velocities.errors());
+        let own = errors.iter_mut().zip(self.velocities.errors());
+        for ((error, own), systematic) in own.zip(self.velocities.systematic_errors()) {
+            *error = if systematic == 0.0 { own } else { own.hypot(systematic) };
+        }
         for (axis, error) in errors.iter_mut().enumerate().skip(2) {
             let mut one = [0.0; MOMENTS];
             one[axis] = 1.0;

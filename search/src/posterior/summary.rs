@@ -149,8 +149,8 @@ fn too_noisy(problem: &PosteriorProblem, errors: MomentVector) -> Option<String>
 }
 
 /// Returns the p-value of the data under the law of the best point's velocities, moved to the
-/// posterior means of the moments; `None` without velocities, and where they are not independent or
-/// have scatter of the instrument.
+/// posterior means of the moments; `None` without velocities, and where they are not independent, have
+/// scatter of the instrument, or are of a setup that is not known exactly.
 pub(super) fn predictive_p_value(
     specification: &JobSpecification,
     set: usize,
@@ -158,7 +158,7 @@ pub(super) fn predictive_p_value(
     found: &Posterior,
 ) -> Option<f64> {
     let data = specification.data.as_ref()?.set(set)?;
-    if data.subjects.is_some() || data.repeatability > 0.0 {
+    if data.subjects.is_some() || data.repeatability > 0.0 || !specification.systematic.is_empty() {
         return None;
     }
     let coefficient_of_variation = found.coefficient_of_variation.mean;

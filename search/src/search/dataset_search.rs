@@ -4,6 +4,7 @@
 use osteon_common::ensemble::Germs;
 use osteon_common::inference::{ModelAtPoint, MomentWeights, agreement, model_errors};
 use osteon_common::job::{JobSpecification, MonteCarlo, NoVariation, Objective, Range};
+use osteon_common::moments::MomentVector;
 use osteon_common::observables::ObservableValues;
 use osteon_common::outcomes::Outcomes;
 use osteon_common::parameters::{Parameter, Point};
@@ -13,7 +14,7 @@ use osteon_common::statistics::{PointStatistics, estimate, likelihood_cost, obse
 use super::ending::Ending;
 use super::method::MethodState;
 use super::reasons;
-use crate::posterior::{PosteriorSearch, SetLikelihood, feasible_moments};
+use crate::posterior::{PosteriorSearch, SearchOutcome, SetLikelihood, feasible_moments};
 use crate::proposal::{Proposal, StopReason};
 use crate::search_box::{SearchBox, admissible};
 
@@ -50,6 +51,10 @@ pub(super) struct DatasetSearch {
     stop: Option<StopReason>,
     /// Points that measure derivatives, in reverse order.
     differences: Vec<(Option<Parameter>, Point)>,
+    /// Evaluations with a shifted setup.
+    shifted: Vec<Evaluation>,
+    /// Whether there is no posterior because one of these has no moments.
+    lacks_effect: bool,
     /// Feasible points of the search, kept only for a posterior.
     known: Vec<(Point, ComparedMoments)>,
     /// Points of the posterior, which come last.
@@ -113,6 +118,8 @@ impl DatasetSearch {
             trials: reasons::Trials::default(),
             stop: None,
             differences: Vec::new(),
+            shifted: Vec::new(),
+            lacks_effect: false,
             known: Vec::new(),
             posterior: None,
             ending: None,
@@ -223,6 +230,9 @@ impl DatasetSearch {
             row.moments = statistics.moments.filter(|_| is_kept);
             if row.moments.is_none() {
                 row.observables = ObservableValues::default();
+            }
+            if shifted {
+                self.shifted.push(row);
             }
         } else {
             self.method.tell(row.cost.unwrap_or(f64::INFINITY), statistics.compared());
@@ -381,26 +391,42 @@ impl DatasetSearch {
             return self.end(specification);
         }
         let set = self.set as usize;
-        let likelihood = SetLikelihood::new(specification, set);
+        let likelihood = match SetLikelihood::new(specification, set) {
+            Some(found) if !specification.systematic.is_empty() => {
+                let found = self.model_at_best(specification, |model, _| {
+                    found.with_systematic(specification, set, model, &self.shifted)
+                });
+                let Some(found) = found.flatten() else {
+                    self.lacks_effect = true;
+                    return self.end(specification);
+                };
+                Some(found)
+            }
+            found => found,
+        };
         let known = std::mem::take(&mut self.known);
         let posterior =
             PosteriorSearch::new(&specification.of_set(set), likelihood, known.into_iter());
         self.posterior = Some(Box::new(posterior));
     }
 
+    /// Returns what `of` says of the model at the best point and its sampling errors; `None` if no realization
+    /// succeeded there.
+    fn model_at_best<T>(
+        &self,
+        specification: &JobSpecification,
+        of: impl FnOnce(ModelAtPoint<'_>, MomentVector) -> T,
+    ) -> Option<T> {
+        let Best { row, outcomes } = self.best.as_ref()?;
+        let velocity = &estimate(&specification.monte_carlo, &row.point, outcomes)?;
+        let observables = &observable_estimates(&specification.monte_carlo, outcomes);
+        let errors = model_errors(&self.data, velocity, observables);
+        Some(of(ModelAtPoint { point: &row.point, velocity, observables, outcomes }, errors))
+    }
+
     fn end(&mut self, specification: &JobSpecification) {
-        let monte_carlo = &specification.monte_carlo;
-        let found = self.best.as_ref().and_then(|Best { row, outcomes }| {
-            let velocity = estimate(monte_carlo, &row.point, outcomes)?;
-            let observables = observable_estimates(monte_carlo, outcomes);
-            let model = ModelAtPoint {
-                point: &row.point,
-                velocity: &velocity,
-                observables: &observables,
-                outcomes,
-            };
-            let errors = model_errors(&self.data, &velocity, &observables);
-            Some((agreement(specification, self.set as usize, model), errors))
+        let found = self.model_at_best(specification, |model, errors| {
+            (agreement(specification, self.set as usize, model), errors)
         });
         let (agreement, errors) = found.unzip();
         let evidence = reasons::Evidence {
@@ -409,14 +435,13 @@ impl DatasetSearch {
             trials: self.trials,
             first: self.first.as_ref(),
             evaluations: self.evaluations,
-            posterior: self.posterior.as_ref().map(|posterior| {
-                if specification.is_searched() {
-                    // The search has a status of its own, which the posterior does not change.
-                    posterior.outcome()
-                } else {
-                    posterior.ending(errors)
-                }
-            }),
+            posterior: match &self.posterior {
+                // The search has a status of its own, which the posterior does not change.
+                Some(posterior) if specification.is_searched() => Some(posterior.outcome()),
+                Some(posterior) => Some(posterior.ending(errors)),
+                None if self.lacks_effect => Some(SearchOutcome::UnknownEffect),
+                None => None,
+            },
         };
         // Always set before the end.
         let stop = self.stop.unwrap_or(StopReason::Converged);

@@ -52,6 +52,9 @@ impl Trials {
 const NO_POSTERIOR: &str = "no parameter set within the bounds and the priors comes near the data, \
                             so there is no posterior; widen them, or free more parameters";
 
+const UNKNOWN_EFFECT: &str = "there is no posterior, because too many realizations fail with a setup that is \
+                              shifted as [systematic] says; lower its spread, or leave it out";
+
 /// A search was stopped by failed realizations if at least one point in this many had too many of
 /// them. Points that measure slopes lie beside the best one and are rarely refused.
 const REFUSED_IN: u64 = 4;
@@ -81,13 +84,23 @@ pub(super) fn ending(
         }
         StopReason::Infeasible => (Status::Failed, Some(no_usable_point(evidence, specification))),
     };
-    let reason = match evidence.posterior {
-        Some(SearchOutcome::NothingMatches) if specification.is_searched() => {
-            Some(reason.map_or(NO_POSTERIOR.to_owned(), |why| format!("{why}; {NO_POSTERIOR}")))
+    let reason = match &evidence.posterior {
+        Some(outcome) if specification.is_searched() && why_none(outcome).is_some() => {
+            let [of_search, none] = [reason.as_deref(), why_none(outcome)];
+            Some([of_search, none].into_iter().flatten().collect::<Vec<&str>>().join("; "))
         }
         _ => reason,
     };
     Ending::from_search(status, reason)
+}
+
+/// Returns why there is no posterior; `None` if there is one.
+fn why_none(outcome: &SearchOutcome) -> Option<&'static str> {
+    match outcome {
+        SearchOutcome::NothingMatches => Some(NO_POSTERIOR),
+        SearchOutcome::UnknownEffect => Some(UNKNOWN_EFFECT),
+        SearchOutcome::Converged | SearchOutcome::Doubtful(_) => None,
+    }
 }
 
 /// Returns status and explanation of a job that asks for nothing but the posterior.
@@ -95,7 +108,7 @@ fn of_posterior(outcome: Option<&SearchOutcome>) -> (Status, Option<String>) {
     match outcome {
         Some(SearchOutcome::Converged) | None => (Status::Converged, None),
         Some(SearchOutcome::Doubtful(reason)) => (Status::MaxEvaluations, Some(reason.clone())),
-        Some(SearchOutcome::NothingMatches) => (Status::NotMatched, Some(NO_POSTERIOR.to_owned())),
+        Some(outcome) => (Status::NotMatched, why_none(outcome).map(str::to_owned)),
     }
 }
 

@@ -3,8 +3,10 @@
 use osteon_common::conclusions::{BudgetQuantity, BudgetSource};
 use osteon_common::ensemble::Germs;
 use osteon_common::inference::Inference;
-use osteon_common::job::Sampling;
+use osteon_common::job::{PosteriorSettings, Sampling};
+use osteon_common::outcome::FailureKind;
 use osteon_common::parameters::Parameter;
+use osteon_common::posterior::Posterior;
 use osteon_common::special::standard_normal_quantile;
 use osteon_common::systematic::{SystematicLaw, SystematicQuantity};
 
@@ -130,4 +132,56 @@ fn intervals_hold_truths_of_other_setups() {
     }
     let shares = held.map(|held| held as f64 / STUDIES as f64);
     assert!((0.92..=0.98).contains(&shares[0]) && shares[1] < 0.7, "{shares:?}");
+}
+
+/// Returns the job with the default posterior.
+fn with_posterior(job: JobSpecification) -> JobSpecification {
+    JobSpecification { posterior: Some(PosteriorSettings::default()), ..job }
+}
+
+fn posterior(job: &JobSpecification) -> Posterior {
+    let complete =
+        identify(job, |realizations| Ok::<_, Infallible>(speeds_of_plate(realizations))).unwrap();
+    complete.result.conclusions.posterior.unwrap()
+}
+
+/// With few velocities and with so many that the setup's error is ten times theirs, the posterior is as wide as the
+/// interval of the linear theory, and about the same value: with two free parameters they tell the same.
+#[test]
+fn a_posterior_is_as_wide_as_the_interval() {
+    for count in [100, 4000] {
+        let velocities = draw_velocities(7, count, (0.0, 0.0));
+        let exact = posterior(&with_posterior(job(velocities.clone(), Systematic::default())));
+        let job = with_posterior(job(velocities, both()));
+        let (whole, expected) = (posterior(&job), found(&job));
+        assert!(whole.converged && exact.converged, "{count}: {:?}", whole.reason);
+        let ratio = |found: &Posterior| {
+            let known = expected.bulk_velocity.known.unwrap();
+            found.bulk_velocity.standard_deviation / known.standard_error
+        };
+        let off = (whole.bulk_velocity.mean - expected.bulk_velocity.value)
+            / whole.bulk_velocity.standard_deviation;
+        assert!(off.abs() < 0.1, "{count}: {off}");
+        assert!((ratio(&whole) - 1.0).abs() < 0.05, "{count}: {}", ratio(&whole));
+        assert!(ratio(&exact) < 0.6, "{count}: {}", ratio(&exact));
+        assert_eq!(whole.predictive_p_value, None);
+    }
+}
+
+#[test]
+fn an_effect_that_is_not_measured_leaves_no_posterior() {
+    let own = Setup::default();
+    let job = with_posterior(job(draw_velocities(7, 100, (0.0, 0.0)), both()));
+    let complete = identify(&job, |realizations| {
+        let setup = realizations.point.setup(&own);
+        let mut solved = speeds_of_plate(realizations);
+        if setup.layers.bone_thickness != own.layers.bone_thickness {
+            solved.fill(RealizationResult::failed(FailureKind::NoArrival));
+        }
+        Ok::<_, Infallible>(solved)
+    });
+    let result = complete.unwrap().result;
+    assert!(result.conclusions.posterior.is_none());
+    let reason = result.reason.unwrap();
+    assert!(reason.contains("too many realizations fail with a setup that is shifted"), "{reason}");
 }
