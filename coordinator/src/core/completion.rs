@@ -1,7 +1,7 @@
-//! Completion of a large evaluation, which takes so long that it is not done by the core.
+//! Completion of an evaluation that takes so long that it is not done by the core.
 //!
-//! Outcomes are gathered, moments computed and the digest continued, over millions of realizations.
-//! Meanwhile the core would answer nobody. So it hands the evaluation and its search out
+//! Outcomes are gathered, moments computed and the digest continued, over millions of realizations; or the search
+//! draws a batch of a posterior, for seconds. Meanwhile the core would answer nobody. So it hands the evaluation and its search out
 //! ([`Effect::Complete`](crate::core::effect::Effect::Complete)), and gets back first a record, which is
 //! stored meanwhile, and then the search.
 

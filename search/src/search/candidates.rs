@@ -18,6 +18,12 @@ impl Search {
         }
     }
 
+    /// Returns whether `tell` may take seconds: after the last point that a search with a posterior knows of, it draws
+    /// the posterior of what it has interpolated.
+    pub fn takes_long(&self) -> bool {
+        self.specification.posterior.is_some() && self.candidates(1).is_empty()
+    }
+
     /// Returns the point that the search will ask for once it is given these outcomes of the
     /// pending point, followed by candidates after that one; at most `most` points, the most
     /// probable first. The assessment of the outcomes is cached until they are passed to `tell`.

@@ -24,7 +24,7 @@ use osteon_search::{Ending, Search, Step};
 const STORED_TOGETHER_MAX: (usize, usize) = (256, 1 << 20);
 
 /// Stores the evaluation of a job once it is complete and checked. A large one is completed beside
-/// the core first.
+/// the core first, and so is one after which the search may draw points of a posterior.
 pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     let aside_min = turn.state.config.completed_aside_min;
     if let Some(attempt) = turn.state.jobs.get(&id).and_then(Job::evaluation).map(|it| it.attempt) {
@@ -36,7 +36,9 @@ pub(crate) fn store_if_complete(turn: &mut Turn, id: JobId) {
     let Stage::Computing(evaluation) = &mut job.stage else {
         return;
     };
-    if evaluation.is_settled() && evaluation.realizations() >= aside_min {
+    if evaluation.is_settled()
+        && (evaluation.realizations() >= aside_min || job.search.takes_long())
+    {
         complete_aside(turn, id);
         return;
     }

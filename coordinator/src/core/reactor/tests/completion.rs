@@ -1,5 +1,7 @@
 //! Large evaluations, which are completed beside the core.
 
+use osteon_common::job::{Measurements, PosteriorSettings, SearchMethod};
+
 use super::*;
 use crate::core::completion::Completion;
 use crate::core::worker_name::WorkerName;
@@ -85,6 +87,28 @@ fn a_job_is_computed_again_if_a_worker_is_banned_after_the_evaluation_is_durable
     let after = rig.event(completed);
     assert!(!after.iter().any(|effect| effect.contains("end")), "{after:?}");
     assert_eq!(rig.state.jobs[&JobId(1)].search.evaluations(), 0);
+}
+
+#[test]
+fn a_posterior_is_drawn_beside_the_core() {
+    let mut rig = Rig::new();
+    rig.state.config.audit_fraction = 0.0;
+    let mut job = identification(4);
+    let (mean, coefficient_of_variation) = (3901.5, 2.9e-4);
+    let measurements = Measurements::Moments { mean, coefficient_of_variation, count: Some(1000) };
+    job.data = Some(Data { measurements, repeatability: 0.0 });
+    job.search = Search::by(SearchMethod::Posterior);
+    job.posterior = Some(PosteriorSettings::default());
+    rig.accept(job);
+    rig.event(hello(1, 4));
+    // The first batch has 32 points, and only after the last of them points are drawn.
+    for number in 0..31 {
+        let stored = format!("store job 1 evaluation {number}");
+        rig.check(answer(1, number + 1, 0, 4), &[&stored]);
+        let next = format!("send 1: batch {} = 0+4", number + 2);
+        rig.check(stored_event(1, RecordKey::Evaluation(number)), &[&next]);
+    }
+    rig.check(answer(1, 32, 0, 4), &["complete an evaluation of job 1"]);
 }
 
 #[test]
