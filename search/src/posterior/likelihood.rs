@@ -103,7 +103,8 @@ impl SetLikelihood {
         let mut errors = [f64::INFINITY; MOMENTS];
         let own = errors.iter_mut().zip(self.velocities.errors());
         for ((error, own), systematic) in own.zip(self.velocities.systematic_errors()) {
-            *error = if systematic == 0.0 { own } else { own.hypot(systematic) };
+            *error =
+                if systematic == 0.0 { own } else { (own * own + systematic * systematic).sqrt() };
         }
         for (axis, error) in errors.iter_mut().enumerate().skip(2) {
             let mut one = [0.0; MOMENTS];
