@@ -5,7 +5,7 @@
 //! data's errors. Where the law is the wider, nodes are a fixed part of a data's error apart, and only those near
 //! the data count.
 
-use super::NORMAL_NODES;
+use super::nodes::NORMAL_NODES;
 
 /// Distance of nodes, in errors of the data, and how far they reach, in standard deviations of the law: the sum is
 /// that of the integral to exp(-2 (π/1.5)²), 2e-4 of it.
