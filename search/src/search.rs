@@ -36,6 +36,7 @@ mod advice;
 mod branch;
 mod candidates;
 mod dataset_search;
+mod differences;
 mod ending;
 mod identification;
 mod method;

@@ -19,12 +19,12 @@ pub(super) struct CorrelatedErrors {
     centre: [f64; 2],
     /// Distance from these, in units of the data's errors, beyond which the likelihood is negligible.
     reach: f64,
-    axes: [Axis; 2],
+    axes: [PrincipalAxis; 2],
 }
 
 /// A principal axis of the law in units of the data's errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Axis {
+struct PrincipalAxis {
     /// Change of both logarithms by a step of one error of the data along the axis.
     step: [f64; 2],
     /// Change of the position along the axis, in errors of the data, by those of both logarithms.
@@ -43,7 +43,7 @@ impl CorrelatedErrors {
         let scaled = |i: usize, j: usize| covariance[i][j] / (errors[i] * errors[j]);
         let (first, both, second) = (scaled(0, 0), scaled(0, 1), scaled(1, 1));
         let (sine, cosine) = libm::sincos(0.5 * libm::atan2(2.0 * both, first - second));
-        let axis = |[x, y]: [f64; 2]| Axis {
+        let axis = |[x, y]: [f64; 2]| PrincipalAxis {
             step: [x * errors[0], y * errors[1]],
             position: [x / errors[0], y / errors[1]],
             width: (first * x * x + 2.0 * both * x * y + second * y * y).max(0.0).sqrt(),
@@ -70,7 +70,7 @@ impl CorrelatedErrors {
     }
 }
 
-impl Axis {
+impl PrincipalAxis {
     /// Returns positions relative to a model's, in errors of the data, and logarithms of weights, given the model's
     /// position relative to the data's.
     fn nodes(&self, offset: f64, reach: f64) -> Vec<(f64, f64)> {

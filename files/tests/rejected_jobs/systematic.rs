@@ -32,7 +32,8 @@ fn it_needs_a_search_and_its_derivatives() {
     let without = edited("", &format!("\n[systematic]\n{thickness}\n"));
     let refused = refusal(&without, JobKind::Identification);
     assert!(refused.contains("search.sensitivities is false; leave one of them out"), "{refused}");
-    let with = edited(WITHOUT, &format!("method = \"posterior\"\n\n[systematic]\n{thickness}\n"));
+    let with = edited(WITHOUT, &format!("[systematic]\n{thickness}\n"));
+    let with = with.replace("method = \"simplex\"", "method = \"posterior\"");
     let refused = refusal(&with, JobKind::Identification);
     assert!(refused.contains("needs the best point of a search"), "{refused}");
 }

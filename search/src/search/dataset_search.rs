@@ -3,7 +3,7 @@
 
 use osteon_common::ensemble::Germs;
 use osteon_common::inference::{ModelAtPoint, MomentWeights, agreement, model_errors};
-use osteon_common::job::{JobSpecification, MonteCarlo, NoVariation, Objective, Range};
+use osteon_common::job::{JobSpecification, MonteCarlo, NoVariation, Objective};
 use osteon_common::moments::MomentVector;
 use osteon_common::observables::ObservableValues;
 use osteon_common::outcomes::Outcomes;
@@ -11,15 +11,14 @@ use osteon_common::parameters::{Parameter, Point};
 use osteon_common::results::{ComparedMoments, Evaluation, EvaluationRole, GroupEnding, Status};
 use osteon_common::statistics::{PointStatistics, estimate, likelihood_cost, observable_estimates};
 
+use super::differences::differences;
 use super::ending::Ending;
 use super::method::MethodState;
 use super::reasons;
 use crate::posterior::{PosteriorSearch, SearchOutcome, SetLikelihood, feasible_moments};
 use crate::proposal::{Proposal, StopReason};
-use crate::search_box::{SearchBox, admissible};
+use crate::search_box::SearchBox;
 
-/// Step of the finite differences that measure derivatives, in edges of the box.
-const DIFFERENCE: f64 = 1e-4;
 /// χ² at which a further start ends once an earlier one has met the tolerance, and so is the answer:
 /// a tenth of a standard error of the data is enough for one more set of parameters that fits them.
 const FITTING: f64 = 1e-2;
@@ -488,35 +487,4 @@ fn space_of_start(specification: &JobSpecification, set: usize, start: u32) -> S
     });
     let mut usable = tries.filter(|moved| moved.admits(&moved.point(&moved.start())));
     usable.next().unwrap_or(space)
-}
-
-/// Returns points close to `best`, each differing in one free parameter, the first parameter last, after
-/// those that measure what uncertain quantities of the setup move.
-fn differences(specification: &JobSpecification, best: &Point) -> Vec<(Option<Parameter>, Point)> {
-    let beside = |parameter: Parameter| {
-        let Range::Free { lower, upper, .. } = specification.range(parameter) else {
-            return None;
-        };
-        let step = DIFFERENCE * specification.range(parameter).edge();
-        let value = best.get(parameter);
-        let moved = |value: f64| {
-            let mut point = *best;
-            point.0[parameter as usize] = value;
-            (Some(parameter), point)
-        };
-        let steps = [value + step, value - step].into_iter();
-        let mut within = steps.filter(|value| (lower..=upper).contains(value)).map(moved);
-        within.find(|(_, point)| admissible(&specification.setup.structure, point))
-    };
-    let free = Parameter::ALL.into_iter().rev().filter_map(beside);
-    shifted_points(specification, best).into_iter().chain(free).collect()
-}
-
-/// Returns the points with which the effects of uncertain quantities of the setup are measured.
-fn shifted_points(
-    specification: &JobSpecification,
-    best: &Point,
-) -> Vec<(Option<Parameter>, Point)> {
-    let shifts = specification.shifts(&best.setup(&specification.setup));
-    shifts.into_iter().map(|shift| (None, best.shifted(Some(shift)))).collect()
 }
