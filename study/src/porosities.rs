@@ -16,7 +16,7 @@ use osteon_common::quantile::quantile;
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::systematic::Systematic;
 
-use crate::blocks::{Block, in_blocks};
+use crate::blocks::{FinishedBlock, in_blocks};
 use crate::generator::Generator;
 use crate::identify::{RealizationCache, Surroundings, identify};
 use crate::table::{MarkdownTable, millimetres, two_digits};
@@ -65,7 +65,7 @@ const DISPERSION: f64 = 0.1;
 pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let mut counts = [[IntervalCount::default(); 2]; COVERAGE_VELOCITIES.len()];
     for block in in_blocks(twins.repetitions, |number| identify_bone(twins, number)) {
-        let Block { done, found } = block?;
+        let FinishedBlock { done, found } = block?;
         for found in &found {
             for (count, found) in counts.iter_mut().flatten().zip(found.iter().flatten()) {
                 count.add(found);

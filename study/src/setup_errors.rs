@@ -11,7 +11,7 @@ use osteon_common::random_quantities::{RandomDistribution, RandomQuantities};
 use osteon_common::special::standard_normal_quantile;
 use osteon_common::systematic::{Systematic, SystematicQuantity, usual};
 
-use crate::blocks::{Block, in_blocks};
+use crate::blocks::{FinishedBlock, in_blocks};
 use crate::generator::Generator;
 use crate::identify::{RealizationCache, Surroundings, identify};
 use crate::table::MarkdownTable;
@@ -56,7 +56,7 @@ type Recovered = [(Option<DerivedQuantity>, f64); 2];
 pub fn coverage(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, StudyError> {
     let mut held = [[[Held::default(); 2]; 2]; VELOCITIES.len()];
     for block in in_blocks(twins.repetitions, |number| identify_bone(twins, number, &VELOCITIES)) {
-        let Block { done, found } = block?;
+        let FinishedBlock { done, found } = block?;
         for found in &found {
             let places = held.iter_mut().flatten().flatten();
             places.zip(found.iter().flatten().flatten()).for_each(|(held, found)| held.add(found));

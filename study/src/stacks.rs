@@ -14,7 +14,7 @@ use osteon_common::violations::Violations;
 use osteon_solver::check::{Difference, difference};
 use osteon_solver::{Arrival, Failure, Isa, Solver, Workspace};
 
-use crate::blocks::{Block, in_blocks};
+use crate::blocks::{FinishedBlock, in_blocks};
 use crate::draws::Draws;
 use crate::generator::Generator;
 use crate::setups::point;
@@ -48,7 +48,7 @@ pub fn table(draws: &Draws, progress: RowCallback<'_>) -> Result<MarkdownTable, 
     let mut solved = Vec::new();
     let solve = |index| case(draws.seed, index).map(|found| Some(solve(index, found?, draws.isa)));
     for block in in_blocks(draws.realizations, solve) {
-        let Block { done, found } = block?;
+        let FinishedBlock { done, found } = block?;
         found.iter().flat_map(describe).for_each(|line| progress(&line));
         progress(&format!("{done} stacks"));
         solved.extend(found);
