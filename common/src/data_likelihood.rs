@@ -32,10 +32,12 @@ pub use self::nodes::MODEL_ERROR_MAX;
 /// Distance from the data's moments, in units of their errors, beyond which the likelihood is
 /// negligible.
 const FAR: f64 = 15.0;
-/// The same where the model's moments have a much wider law, whose density hardly changes over so few errors.
+/// The same where errors of the setup give the model's moments a normal law much wider than the data's errors: its
+/// density hardly changes over the distance, so that less of it is enough.
 const REACH: f64 = 5.0;
 /// Rounding that adds less than this share of the variance is negligible.
 const ROUNDING: f64 = 1e-3;
+
 /// The likelihood of one set of data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DataLikelihood {

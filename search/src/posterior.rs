@@ -62,12 +62,7 @@ pub(crate) fn posterior(
         .filter(|row| !row.role.posterior)
         .filter_map(|row| Some((row.point, feasible_moments(row)?)));
     let (data, best) = (specification.data.as_ref()?, best?);
-    let model = ModelAtPoint {
-        point: &best.point,
-        velocity: best.velocity.as_ref()?,
-        observables: &best.observables,
-        outcomes: &best.outcomes,
-    };
+    let model = ModelAtPoint::of_best(best)?;
     let likelihood = match SetLikelihood::new(specification, set) {
         Some(found) => Some(found.with_systematic(specification, set, model, history)?),
         None => None,

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use crate::accuracy::REFERENCE;
 use crate::draws::{Draws, OPTIMUM};
 use crate::generator::Generator;
-use crate::spread::DifferenceSummary;
+use crate::spread::{DifferenceSummary, keeps_stated_errors};
 use crate::table::{MarkdownTable, percent, two_digits};
 use crate::{RowCallback, StudyError};
 
@@ -190,8 +190,7 @@ impl MeasuredSetup {
     /// Returns whether the velocity is no farther from the reference than both state; `None` if it has
     /// not both.
     fn keeps_stated_errors(&self) -> Option<bool> {
-        let error = self.difference.velocity()?;
-        Some(error <= self.stated_error(&self.found)? + self.stated_error(&self.reference)?)
+        keeps_stated_errors(self.difference, [&self.found, &self.reference])
     }
 
     /// Returns the stated error of one of the two solutions of a case that has both.

@@ -2,6 +2,7 @@
 
 use osteon_common::quantile::quantile;
 use osteon_solver::check::Difference;
+use osteon_solver::{Arrival, Failure};
 
 /// Summary statistics of many differences.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +32,16 @@ impl DifferenceSummary {
     pub(crate) fn velocity(&self, p: f64) -> Option<f64> {
         quantile(&self.velocities, p)
     }
+}
+
+/// Returns whether two velocities differ by no more than both state; `None` without two velocities.
+pub(crate) fn keeps_stated_errors(
+    difference: Difference,
+    outcomes: [&Result<Arrival, Failure>; 2],
+) -> Option<bool> {
+    let error = difference.velocity()?;
+    let [one, other] = outcomes.map(|outcome| outcome.as_ref().ok());
+    Some(error <= one?.estimated_error + other?.estimated_error)
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use crate::blocks::{FinishedBlock, in_blocks};
 use crate::draws::Draws;
 use crate::generator::Generator;
 use crate::setups::point;
-use crate::spread::DifferenceSummary;
+use crate::spread::{DifferenceSummary, keeps_stated_errors};
 use crate::table::{MarkdownTable, percent, two_digits};
 use crate::{RowCallback, StudyError};
 
@@ -107,14 +107,8 @@ impl Solutions {
     /// Returns whether both methods have a velocity in a row, and these differ by no more than both state.
     fn keeps_stated_errors(&self, row: usize) -> bool {
         let [exact, hybrid] = &self.pairs[row];
-        let stated = exact
-            .as_ref()
-            .ok()
-            .zip(hybrid.as_ref().ok())
-            .map(|(exact, hybrid)| exact.estimated_error + hybrid.estimated_error);
-        stated
-            .zip(compare(&self.case, &self.pairs[row]).velocity())
-            .is_some_and(|(stated, found)| found <= stated)
+        let difference = compare(&self.case, &self.pairs[row]);
+        keeps_stated_errors(difference, [exact, hybrid]) == Some(true)
     }
 }
 

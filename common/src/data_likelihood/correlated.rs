@@ -2,8 +2,8 @@
 //! that is not known exactly.
 //!
 //! The average of the likelihood over a normal law is a sum over nodes along its principal axes, in units of the
-//! data's errors. Where the law is the wider, nodes are a fixed part of a data's error apart, and only those near
-//! the data count.
+//! data's errors. Along an axis on which the law is wider than a data's error, nodes have a fixed distance, and
+//! only those near the data are used.
 
 use super::nodes::NORMAL_NODES;
 
@@ -74,7 +74,7 @@ impl PrincipalAxis {
     /// Returns positions relative to a model's, in errors of the data, and logarithms of weights, given the model's
     /// position relative to the data's.
     fn nodes(&self, offset: f64, reach: f64) -> Vec<(f64, f64)> {
-        // Nodes a part of the data's error apart do for laws that are not much narrower than this.
+        // Nodes of the fixed distance would miss a law that is narrower than it.
         if self.width <= 1.0 {
             let node = |(z, weight): &(f64, f64)| (z * self.width, libm::log(*weight));
             return NORMAL_NODES.iter().map(node).collect();

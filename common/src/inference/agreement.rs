@@ -36,7 +36,7 @@ pub struct Agreement {
     pub held: bool,
 }
 
-/// What the model says at a point.
+/// Moments, observables and realizations of the model at one point.
 #[derive(Debug, Clone, Copy)]
 pub struct ModelAtPoint<'a> {
     /// The point.
@@ -50,8 +50,8 @@ pub struct ModelAtPoint<'a> {
 }
 
 impl<'a> ModelAtPoint<'a> {
-    /// Returns what it says at a best point; `None` if no realization succeeded there.
-    pub(super) fn of_best(best: &'a BestPoint) -> Option<Self> {
+    /// Returns those at a best point; `None` if no realization succeeded there.
+    pub fn of_best(best: &'a BestPoint) -> Option<Self> {
         Some(Self {
             point: &best.point,
             velocity: best.velocity.as_ref()?,
