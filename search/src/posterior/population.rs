@@ -26,7 +26,11 @@ const PRIOR_POINTS: u64 = 1024;
 /// is drawn beyond.
 const REACH: [[f64; 2]; 2] = [[-0.3, 0.3], [-2.2, -0.5]];
 /// Maximum number of corrections of the pivots for one point.
-const CORRECTIONS_MAX: usize = 40;
+const CORRECTIONS_MAX: usize = 64;
+/// Number of corrections after which every second one is followed by an extrapolation. A pivot that hardly moves the
+/// velocity, such as the porosity at the far side of a thick plate, though it moves that of the mean solid, would
+/// else be corrected by a small part of its error at a time.
+const PLAIN_CORRECTIONS: usize = 40;
 /// Corrections end when the deviations change by at most this.
 const CORRECTED: f64 = 1e-9;
 /// Points whose moments differ from those wanted by more than this are no solutions.
@@ -247,27 +251,43 @@ impl PosteriorProblem {
     ) -> Option<(Point, [f64; 2])> {
         let first = features(&self.structure, &point).map(|at| model.mean_of_velocities(&at));
         let mut deviations = first.unwrap_or([RULE_OF_THUMB[0], RULE_OF_THUMB[1]]);
-        for _ in 0..CORRECTIONS_MAX {
-            if self.pivots.dispersion {
-                let dispersion = libm::exp(wanted[1] - deviations[1]);
-                self.set(&mut point, Parameter::Dispersion, dispersion)?;
-            }
-            if let Some(pivot) = self.pivots.mean {
-                let wanted = wanted[0] - deviations[0];
-                let value = solve(&self.structure, &point, pivot, wanted, branch)?;
-                self.set(&mut point, pivot, value)?;
-            }
-            let found = model.mean_of_velocities(&features(&self.structure, &point)?);
+        let mut before = deviations;
+        for correction in 0..CORRECTIONS_MAX {
+            let found = self.correct(model, &mut point, (wanted, deviations), branch)?;
             let change = (found[0] - deviations[0]).abs().max((found[1] - deviations[1]).abs());
-            deviations = found;
+            let sequence = [before, deviations, found];
+            (before, deviations) = (deviations, found);
             if change <= CORRECTED {
                 break;
+            }
+            if correction >= PLAIN_CORRECTIONS && correction.is_multiple_of(2) {
+                deviations = [0, 1].map(|k| limit(sequence.map(|one| one[k])));
             }
         }
         let closed = closed_form(&self.structure, &point)?;
         let is_solved =
             |k: usize| (closed[k] + deviations[k] - wanted[k]).abs() <= UNSOLVED || !self.solves(k);
         (is_solved(0) && is_solved(1)).then_some((point, deviations))
+    }
+
+    /// Moves the pivots to where the moments are those wanted with the deviations given; returns the deviations there.
+    fn correct(
+        &self,
+        model: &Surrogate,
+        point: &mut Point,
+        (wanted, deviations): ([f64; 2], [f64; 2]),
+        branch: usize,
+    ) -> Option<[f64; 2]> {
+        if self.pivots.dispersion {
+            let dispersion = libm::exp(wanted[1] - deviations[1]);
+            self.set(point, Parameter::Dispersion, dispersion)?;
+        }
+        if let Some(pivot) = self.pivots.mean {
+            let wanted = wanted[0] - deviations[0];
+            let value = solve(&self.structure, point, pivot, wanted, branch)?;
+            self.set(point, pivot, value)?;
+        }
+        Some(model.mean_of_velocities(&features(&self.structure, point)?))
     }
 
     /// Returns whether a pivot is solved for ln v (0) or ln Δ (1).
@@ -366,6 +386,14 @@ impl Population {
         chosen.extend(last.into_iter().cycle().take(count - chosen.len()));
         chosen
     }
+}
+
+/// Returns the limit of a sequence of these three members whose differences fall by one factor (A. C. Aitken, Proc.
+/// Royal Soc. Edinburgh 46 (1927)); the last of them if there is none.
+fn limit([first, second, third]: [f64; 3]) -> f64 {
+    let (step, next) = (second - first, third - second);
+    let limit = third - next * next / (next - step);
+    if limit.is_finite() { limit } else { third }
 }
 
 /// Returns what `compute` makes of each item and its place, in their order; several threads share the items,

@@ -11,6 +11,7 @@ use osteon_common::job::{
 };
 use osteon_common::moments::MOMENTS;
 use osteon_common::parameters::{Parameter, Point};
+use osteon_common::porosity::BoneMatrix;
 use osteon_common::posterior::{Posterior, PosteriorSummary};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::results::Moments;
@@ -48,6 +49,15 @@ fn slow_model(point: &Point) -> Option<Moments> {
     let [mean, variation] = closed_form(&BoneStructure::default(), point)?;
     let [mean, variation] = [mean - 0.08, variation - 1.1];
     Some(Moments { mean: libm::exp(mean), coefficient_of_variation: libm::exp(variation) })
+}
+
+/// A model such as that of a thick plate whose pores grow in number from the near to the far side: the porosity of
+/// the far side hardly matters, although the closed form is that of the mean solid.
+fn graded_model(point: &Point) -> Option<Moments> {
+    let [near, far] =
+        [Parameter::SurfacePorosity, Parameter::MarrowPorosity].map(|end| point.get(end));
+    let mean = 8.3 - 0.36 * (0.9 * near + 0.1 * far);
+    Some(Moments { mean: libm::exp(mean), coefficient_of_variation: 0.27 * point.dispersion() })
 }
 
 type Model = fn(&Point) -> Option<Moments>;
@@ -226,6 +236,27 @@ fn narrow_bounds_have_the_posterior_of_many_points_of_the_prior() {
         job.parameters[parameter as usize] = Range::Free { start: lower, lower, upper };
     }
     check_with_points_of_the_prior(&job, slow_model);
+}
+
+/// Although the pivot of the mean velocity has to move ten times as far as the closed form says.
+#[test]
+fn a_porosity_profile_has_the_posterior_of_many_points_of_the_prior() {
+    let mut job = specification(&[Parameter::Dispersion], 12, PosteriorSettings::default());
+    let profile = &mut job.setup.structure.profile;
+    (profile.surface, profile.marrow) = (Some(0.08), Some(0.2));
+    let ends = [Parameter::SurfacePorosity, Parameter::MarrowPorosity];
+    let mut truth = Point::of_matrix(&BoneMatrix::default(), 0.1);
+    for (end, (value, [lower, upper])) in
+        ends.into_iter().zip([(0.08, [0.01, 0.15]), (0.2, [0.02, 0.4])])
+    {
+        truth.0[end as usize] = value;
+        job.parameters[end as usize] = Range::Free { start: value, lower, upper };
+    }
+    for parameter in Parameter::OF_BONE.into_iter().filter(|one| *one != Parameter::Dispersion) {
+        job.parameters[parameter as usize] = Range::Fixed(truth.get(parameter));
+    }
+    job.data = Some(Data::from_velocities(with_moments(graded_model(&truth).unwrap(), 12)));
+    check_with_points_of_the_prior(&job, graded_model);
 }
 
 fn check_with_points_of_the_prior(specification: &JobSpecification, model: Model) {
