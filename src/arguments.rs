@@ -33,7 +33,7 @@ pub(crate) use operators::{
     BackupArguments, CoordinatorCommand, DrainArguments, HealthArguments, UnbanArguments,
     WorkerCommand, WorkerListArguments,
 };
-pub(crate) use realizations::{DrawArguments, ObserveArguments, PlaceArguments};
+pub(crate) use realizations::{DesignArguments, DrawArguments, ObserveArguments, PlaceArguments};
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use tools::{
     CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments, SchemaArguments,
@@ -68,6 +68,8 @@ pub(crate) enum Command {
     Draw(DrawArguments),
     /// Compute all observables of a job's realizations: velocities, decay, frequency
     Observe(ObserveArguments),
+    /// Predict which further measurement would narrow most what is known
+    Design(DesignArguments),
     /// Commands of wings.
     #[command(flatten)]
     JobWing(JobWing),

@@ -3,6 +3,7 @@
 mod certs;
 mod check;
 mod coordinator;
+mod design;
 mod doctor;
 mod draw;
 mod init;
@@ -55,6 +56,9 @@ fn prepare_command(
         Command::Observe(arguments) => {
             let observed = observe::observe(arguments, isa()?, context.cores);
             PreparedCommand::interruptible("no file was written", observed)
+        }
+        Command::Design(arguments) => {
+            PreparedCommand::harmless(design::design(arguments, isa()?, context.cores))
         }
         Command::JobWing(command) => command.prepare(context)?,
         Command::Coordinator(Noun::Service(arguments)) => coordinator::prepare(arguments),

@@ -11,6 +11,7 @@ use osteon_common::job::JobSpecification;
 use osteon_common::parameters::Point;
 use osteon_files::report::ResultFile;
 use osteon_local::cost::JobCost;
+use osteon_local::design::Design;
 use osteon_local::modes::BandModes;
 use osteon_local::observations::ObservationSummary;
 use osteon_local::simulation::SolvedCase;
@@ -93,6 +94,15 @@ pub(crate) struct ShownModes<'a> {
     pub(crate) directory: Option<&'a Path>,
 }
 
+/// What further measurements would tell, to show.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShownDesign<'a> {
+    /// The design.
+    pub(crate) design: &'a Design,
+    /// Whether people are shown every measurement, or the best for each quantity.
+    pub(crate) ranked: bool,
+}
+
 /// An output format. Every method writes whole lines.
 pub(crate) trait Output {
     /// Prints the result of a job.
@@ -105,6 +115,8 @@ pub(crate) trait Output {
     fn cost(&mut self, cost: &ShownCost<'_>) -> io::Result<()>;
     /// Prints the observables of a job's realizations.
     fn observations(&mut self, observations: &ShownObservations<'_>) -> io::Result<()>;
+    /// Prints what further measurements would tell.
+    fn design(&mut self, design: &ShownDesign<'_>) -> io::Result<()>;
     /// Prints the id of an accepted job.
     fn submitted(&mut self, job: &str) -> io::Result<()>;
     /// Prints all jobs, and the workers that are banned.

@@ -207,7 +207,7 @@ fn run_in(scratch: &Scratch, command: &str) {
 }
 
 /// The pages for users that show files and commands, with the least number of commands of each.
-const GUIDES: [(&str, usize); 13] = [
+const GUIDES: [(&str, usize); 14] = [
     ("docs/quick-start.md", 5),
     ("docs/tutorial.md", 3),
     ("docs/how-to-csv.md", 3),
@@ -215,6 +215,7 @@ const GUIDES: [(&str, usize); 13] = [
     ("docs/how-to-attenuation.md", 3),
     ("docs/how-to-porosity.md", 2),
     ("docs/how-to-systematic.md", 2),
+    ("docs/how-to-design.md", 3),
     ("docs/how-to-cluster.md", 2),
     ("docs/how-to-resume.md", 2),
     ("docs/how-to-posterior.md", 1),
@@ -279,6 +280,22 @@ fn check_guide(page: &str, scratch: &Scratch) {
             let sources = parts.iter().map(|part| part["source"].as_str().unwrap());
             assert!(sources.clone().any(|name| name == "bone_quality_factor"), "{budget}");
             assert!(!sources.clone().any(|name| name == "tilt"), "{budget}");
+        }
+        "docs/how-to-design.md" => {
+            // A0 tells the shear modulus, of which the velocity tells nothing, and not the density.
+            let designed = json("design.json");
+            let quantities = designed["quantities"].as_array().unwrap();
+            let share = |quantity: &str, measurement: &str| {
+                let found = quantities.iter().find(|one| one["quantity"] == quantity).unwrap();
+                let all = found["measurements"].as_array().unwrap();
+                let one = all.iter().find(|one| one["measurement"] == measurement).unwrap();
+                one["prior_share"].as_f64().unwrap()
+            };
+            let modulus = share("longitudinal_shear_modulus", "a0_velocity=1%");
+            assert!((modulus - 0.4).abs() < 0.03, "{modulus}");
+            let density = share("density", "density=2%");
+            assert!((density - 0.23).abs() < 0.02, "{density}");
+            assert!(share("density", "a0_velocity=1%") > 0.8);
         }
         "docs/how-to-posterior.md" => {
             assert!(read("posterior/posterior.csv").lines().count() > 100);

@@ -20,5 +20,5 @@ pub mod simplex;
 
 pub use expected::ExpectedEvaluations;
 pub use identify::{CompletedJob, IdentifyError, Realizations, identify};
-pub use posterior::PosteriorDensity;
+pub use posterior::{PosteriorDensity, prior_deviation};
 pub use search::{Assessment, Branch, Ending, ReplayError, Search, Step, Summary, same_point};

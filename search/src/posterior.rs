@@ -47,6 +47,7 @@ pub(crate) use self::batches::{PosteriorSearch, SearchOutcome};
 pub use self::density::PosteriorDensity;
 pub(crate) use self::likelihood::SetLikelihood;
 pub(crate) use self::population::closed_form;
+pub use self::prior::prior_deviation;
 
 /// Returns the posterior of set number `set` of the data, given the best point of its search and all
 /// evaluations of the job; `None` if the job asks for none, or its evaluations are not complete.

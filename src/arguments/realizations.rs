@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use osteon_local::design::MeasurementPlan;
 
 use super::JobFileArguments;
 
@@ -47,6 +48,35 @@ pub(crate) struct ObserveArguments {
     #[arg(long, short, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
     /// Print the summary as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Arguments of `design`.
+#[derive(Debug, Args)]
+pub(crate) struct DesignArguments {
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
+    /// The point.
+    #[command(flatten)]
+    pub(crate) place: PlaceArguments,
+    /// Rank all measurements for this quantity: bulk_velocity, or a parameter that the job searches
+    /// [default: the best three for each]
+    #[arg(long = "for", value_name = "NAME")]
+    pub(crate) wanted: Vec<String>,
+    /// Compare this measurement, instead of the usual ones: a0_velocity=1%, density=2% or density=30 (in its
+    /// unit), velocities=1000, both_directions, frequency=0.5e6, height=4e-3, and likewise other observables,
+    /// parameters and quantities of [systematic]; commas join what is measured together
+    #[arg(long, value_name = "NAME=ACCURACY")]
+    pub(crate) with: Vec<MeasurementPlan>,
+    /// Number of velocities [default: that of the data, 100 of a job without data]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(5..=1_000_000_000))]
+    pub(crate) velocities: Option<u64>,
+    /// Number of threads to compute on [default: all cores]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) threads: Option<u32>,
+    /// Print the design as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }

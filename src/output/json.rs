@@ -1,6 +1,7 @@
 //! Output for programs: one JSON value per command, without inf or NaN.
 
 mod cost;
+mod design;
 mod modes;
 mod observations;
 
@@ -14,7 +15,9 @@ use osteon_proto::v1::{
 };
 use serde_json::{Value, json};
 
-use super::{Output, ShownCost, ShownModes, ShownObservations, ShownResult, ShownSimulation};
+use super::{
+    Output, ShownCost, ShownDesign, ShownModes, ShownObservations, ShownResult, ShownSimulation,
+};
 use crate::doctor::{self, Diagnosis};
 use crate::output::text::operators::worker_state_name;
 use crate::output::text::{kind_name, state_name, status_name};
@@ -56,6 +59,9 @@ impl Output for JsonOutput<'_> {
 
     fn observations(&mut self, observations: &ShownObservations<'_>) -> io::Result<()> {
         self.value(&observations::value(observations))
+    }
+    fn design(&mut self, design: &ShownDesign<'_>) -> io::Result<()> {
+        self.value(&design::value(design))
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {

@@ -3,6 +3,7 @@
 mod check;
 mod cost;
 mod data_notes;
+mod design;
 mod details;
 mod fit;
 mod groups;
@@ -30,7 +31,9 @@ use osteon_proto::v1::{
 
 use self::layout::{WIDTH, aligned, glued};
 use self::number::significant;
-use super::{Output, ShownCost, ShownModes, ShownObservations, ShownResult, ShownSimulation};
+use super::{
+    Output, ShownCost, ShownDesign, ShownModes, ShownObservations, ShownResult, ShownSimulation,
+};
 use crate::doctor::Diagnosis;
 use crate::progress::{JobProgress, line, span};
 
@@ -69,6 +72,9 @@ impl Output for TextOutput<'_> {
 
     fn observations(&mut self, observations: &ShownObservations<'_>) -> io::Result<()> {
         self.verbatim(&observations::table(observations))
+    }
+    fn design(&mut self, design: &ShownDesign<'_>) -> io::Result<()> {
+        self.verbatim(&design::table(design))
     }
 
     fn submitted(&mut self, job: &str) -> io::Result<()> {

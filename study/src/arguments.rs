@@ -57,6 +57,9 @@ pub(crate) enum Study {
     /// Count how many confidence intervals contain the true value where the data are of another setup than the
     /// job's, with and without `[systematic] usual = true`
     SetupErrors(TwinsArguments),
+    /// Compare the standard deviations that `osteon design` predicts for five measurements with those of simulated
+    /// studies
+    Designs(TwinsArguments),
     /// Identify one porosity from bones whose porosity changes through the thickness
     UnmodelledProfiles(TwinsArguments),
     /// Count how many intervals of posteriors contain the true value, over parameter sets drawn from

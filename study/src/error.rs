@@ -3,11 +3,12 @@
 use std::convert::Infallible;
 
 use osteon_common::realization::PointError;
+use osteon_local::design::DesignError;
 use osteon_search::IdentifyError;
 use thiserror::Error;
 
 /// Reason why a study has no table.
-#[derive(Debug, Clone, PartialEq, Error)]
+#[derive(Debug, Error)]
 pub enum StudyError {
     /// A point has no ensemble.
     #[error(transparent)]
@@ -15,4 +16,7 @@ pub enum StudyError {
     /// An identification failed.
     #[error(transparent)]
     Identification(#[from] IdentifyError<Infallible>),
+    /// There is no design.
+    #[error(transparent)]
+    Design(#[from] DesignError),
 }

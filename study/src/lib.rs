@@ -11,6 +11,7 @@ pub mod accuracy;
 mod blocks;
 pub mod continuity;
 pub mod convergence;
+pub mod designs;
 pub mod digest;
 mod draws;
 mod error;

@@ -17,9 +17,9 @@ use osteon_study::posteriors::{self, PosteriorCalibration, reference};
 use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
-    Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, digest,
-    failures, methods, models, porosities, refinement, searches, setup_errors, setups, stacks,
-    variance,
+    Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, designs,
+    digest, failures, methods, models, porosities, refinement, searches, setup_errors, setups,
+    stacks, variance,
 };
 
 use crate::arguments::{
@@ -90,6 +90,8 @@ const SETUP_ERRORS: OverTwins = OverTwins {
     repetitions: setup_errors::BONES,
     table: setup_errors::coverage,
 };
+const DESIGNS: OverTwins =
+    OverTwins { name: "designs", repetitions: designs::STUDIES, table: designs::table };
 const UNMODELLED_PROFILES: OverTwins =
     OverTwins { name: "unmodelled-profiles", repetitions: 1, table: porosities::unmodelled };
 
@@ -141,6 +143,7 @@ fn run_study(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::Porosities(arguments) => run_over_twins(&POROSITIES, arguments, isa),
         Study::PorosityProfiles(arguments) => run_over_twins(&POROSITY_PROFILES, arguments, isa),
         Study::SetupErrors(arguments) => run_over_twins(&SETUP_ERRORS, arguments, isa),
+        Study::Designs(arguments) => run_over_twins(&DESIGNS, arguments, isa),
         Study::UnmodelledProfiles(arguments) => {
             run_over_twins(&UNMODELLED_PROFILES, arguments, isa)
         }

@@ -4,6 +4,15 @@ use osteon_common::job::{JobSpecification, PosteriorPrior, Range};
 use osteon_common::parameters::Parameter;
 use osteon_common::special::{normal_probability, standard_normal_quantile};
 
+/// Number of points of a law whose standard deviation is computed.
+const DEVIATION_POINTS: u32 = 1000;
+
+/// Returns the standard deviation of the prior of a parameter, in its unit; `None` if it is not free.
+pub fn prior_deviation(specification: &JobSpecification, parameter: Parameter) -> Option<f64> {
+    let priors = ParameterPrior::of_job(specification);
+    priors.iter().find(|prior| prior.parameter == parameter).map(ParameterPrior::deviation)
+}
+
 /// The prior law of one free parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ParameterPrior {
@@ -66,6 +75,16 @@ impl ParameterPrior {
                 -0.5 * self.score(value) * self.score(value) - libm::log(value / self.upper)
             }
         })
+    }
+
+    /// Returns the standard deviation, by midpoints of equal probability.
+    pub(super) fn deviation(&self) -> f64 {
+        let values: Vec<f64> = (0..DEVIATION_POINTS)
+            .map(|k| self.quantile((f64::from(k) + 0.5) / f64::from(DEVIATION_POINTS)))
+            .collect();
+        let count = f64::from(DEVIATION_POINTS);
+        let mean = values.iter().sum::<f64>() / count;
+        (values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / count).sqrt()
     }
 
     /// Returns the distance between the quantiles at 25 and 75 %.
