@@ -43,7 +43,7 @@ impl Unknown {
 }
 
 /// A model in one setup, whose realizations are computed on common germs.
-pub(super) struct Model<'a> {
+pub(super) struct RespondingModel<'a> {
     pub(super) specification: &'a JobSpecification,
     pub(super) point: Point,
     /// Whether all observables are computed, or the velocity alone.
@@ -70,7 +70,7 @@ pub(super) struct Responses {
 /// Realizations at one point, in index order; those that failed are `None`.
 type Sample = Vec<Option<(f64, ObservableValues)>>;
 
-impl Model<'_> {
+impl RespondingModel<'_> {
     /// Computes the responses; `None` if the model has no moments at the point.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use super::measurement::{Accuracy, Measurement, MeasurementPlan};
 use super::prediction::{
     Design, DesignRequest, DesignTarget, DesignedQuantity, PredictedDeviation,
 };
-use super::responses::{Model, Responses, Unknown};
+use super::responses::{RespondingModel, Responses, Unknown};
 
 /// Number of velocities of a job without data, if none is given.
 pub(super) const VELOCITIES: u64 = 100;
@@ -45,7 +45,7 @@ impl<'a> Study<'a> {
         pool: &'a ThreadPool,
         done: &'a (dyn Fn() + Sync),
     ) -> Result<Self, DesignError> {
-        let model = Model {
+        let model = RespondingModel {
             specification: &specification,
             point: request.point,
             observed: true,
@@ -232,7 +232,7 @@ impl<'a> Study<'a> {
         measurement: &Measurement,
         specification: &JobSpecification,
     ) -> Result<Responses, DesignError> {
-        let model = Model {
+        let model = RespondingModel {
             specification,
             point: self.request.point,
             observed: false,
@@ -267,7 +267,7 @@ fn column(responses: &Responses, axis: usize) -> Vec<f64> {
 }
 
 fn known_responses(
-    model: &Model<'_>,
+    model: &RespondingModel<'_>,
     unknowns: &[Unknown],
     place: &str,
 ) -> Result<Responses, DesignError> {
