@@ -67,7 +67,7 @@ pub(crate) struct DesignArguments {
     pub(crate) wanted: Vec<String>,
     /// Compare this measurement, instead of the usual ones: a0_velocity=1%, density=2% or density=30 (in its
     /// unit), velocities=1000, both_directions, frequency=0.5e6, height=4e-3, and likewise other observables,
-    /// parameters and quantities of [systematic]; commas join what is measured together
+    /// parameters and uncertain quantities of the setup; commas join what is measured together
     #[arg(long, value_name = "NAME=ACCURACY")]
     pub(crate) with: Vec<MeasurementPlan>,
     /// Number of velocities [default: that of the data, 100 of a job without data]
