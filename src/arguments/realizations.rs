@@ -58,9 +58,12 @@ pub(crate) struct DesignArguments {
     /// The job.
     #[command(flatten)]
     pub(crate) job: JobFileArguments,
-    /// The point.
-    #[command(flatten)]
-    pub(crate) place: PlaceArguments,
+    /// Design about the best point of DIR/result.json instead of the job's fixed and start values
+    #[arg(long, value_name = "DIR")]
+    pub(crate) at: Option<PathBuf>,
+    /// The group of the data that is meant, if the job has several
+    #[arg(long, value_name = "NAME")]
+    pub(crate) group: Option<String>,
     /// Rank all measurements for this quantity: bulk_velocity, or a parameter that the job searches
     /// [default: the best three for each]
     #[arg(long = "for", value_name = "NAME")]

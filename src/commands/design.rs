@@ -8,7 +8,7 @@ use osteon_files::job_file::{self, FilePurpose};
 use osteon_local::design::{Design, DesignError, DesignRequest};
 use osteon_solver::Isa;
 
-use crate::arguments::{DesignArguments, PlaceArguments};
+use crate::arguments::DesignArguments;
 use crate::exit_status::{CommandFailure, ExitStatus, stdout_failure};
 use crate::output::{self, ShownDesign};
 use crate::prepared_command::Ended;
@@ -19,13 +19,12 @@ const BAR: &str = "{bar:30} {pos} of {len} realizations, {eta} left";
 
 /// Computes the design and prints it.
 pub(super) async fn design(arguments: DesignArguments, isa: Isa, cores: u32) -> Ended {
-    let DesignArguments { job, place, wanted, with, velocities, threads, json } = arguments;
+    let DesignArguments { job, at, group, wanted, with, velocities, threads, json } = arguments;
     let input = job.open().map_err(CommandFailure::bad_input)?;
     let specification = specification(&input)?;
-    let PlaceArguments { at, group } = &place;
+    let set = set_of_data(&specification, group.as_deref())?;
     let point = job_point::choose(at.as_deref(), group.as_deref(), &input, &specification)
         .map_err(CommandFailure::BadInput)?;
-    let set = set_of_data(&specification, group.as_deref())?;
     let style = ProgressStyle::with_template(BAR).map_err(CommandFailure::failed)?;
     let compute = move || {
         // Hidden unless stderr is a terminal.
@@ -73,13 +72,24 @@ fn set_of_data(
     group: Option<&str>,
 ) -> Result<usize, CommandFailure> {
     let names: Vec<&str> = specification.data.iter().flat_map(|data| data.names()).collect();
-    let Some(group) = group else { return Ok(0) };
-    names.iter().position(|name| *name == group).ok_or_else(|| {
-        CommandFailure::BadInput(anyhow::anyhow!(
-            "--group {group}: the data have no such group; they have {}",
+    let refused = |why: String| Err(CommandFailure::BadInput(anyhow::anyhow!(why)));
+    match group {
+        None if names.is_empty() => Ok(0),
+        None => refused(format!(
+            "the data are of groups; choose one with --group: {}",
             names.join(", ")
-        ))
-    })
+        )),
+        Some(group) => match names.iter().position(|name| *name == group) {
+            Some(set) => Ok(set),
+            None if names.is_empty() => {
+                refused(format!("--group {group}: the data have no groups"))
+            }
+            None => refused(format!(
+                "--group {group}: the data have no such group; they have {}",
+                names.join(", ")
+            )),
+        },
+    }
 }
 
 /// Leaves the quantities that are wanted, in their order; all if none is named.

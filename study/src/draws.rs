@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use osteon_common::case::{Bone, Setup};
 use osteon_common::elasticity::NotElastic;
+use osteon_common::observables::ObservableSet;
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::parameters::{Parameter, Point};
 use osteon_common::realization::{Ensemble, PointError};
@@ -108,8 +109,19 @@ pub(crate) fn solve_realizations(
     ensemble: &Ensemble,
     count: u64,
 ) -> Vec<RealizationResult> {
-    let realization =
-        |workspace: &mut Workspace, index| solver.realization(ensemble, index, workspace);
+    observed_realizations(solver, ObservableSet::NONE, ensemble, count)
+}
+
+/// As [`solve_realizations`], with these observables of each.
+pub(crate) fn observed_realizations(
+    solver: &Solver,
+    observables: ObservableSet,
+    ensemble: &Ensemble,
+    count: u64,
+) -> Vec<RealizationResult> {
+    let realization = |workspace: &mut Workspace, index| {
+        solver.realization_with(observables, ensemble, index, workspace)
+    };
     (0..count).into_par_iter().map_init(Workspace::default, realization).collect()
 }
 

@@ -9,10 +9,10 @@ use osteon_common::outcome::{Outcome, RealizationResult};
 use osteon_common::parameters::{Point, PointBits};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::realization::{Ensemble, PointError};
-use osteon_search::{CompletedJob, IdentifyError};
+use osteon_search::{CompletedJob, IdentifyError, Realizations};
 use osteon_solver::{Isa, Solver};
 
-use crate::draws::solve_realizations;
+use crate::draws::{observed_realizations, solve_realizations};
 
 /// Cache of the realizations at the points at which several identifications begin, by the bits of
 /// the point.
@@ -101,7 +101,8 @@ pub(crate) fn identify(
             return Ok(found.clone());
         }
         solver.change_setup(&realizations.point.setup(&specification.setup));
-        let found = solve_realizations(&solver, &realizations.ensemble, realizations.count);
+        let Realizations { ensemble, count, observables, .. } = &realizations;
+        let found = observed_realizations(&solver, *observables, ensemble, *count);
         if is_first {
             known.insert(bits, found.clone());
         }
