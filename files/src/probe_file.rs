@@ -1,0 +1,113 @@
+//! Probe files: probe, layers and criterion as in a case file, and how signals are recorded.
+
+use std::path::Path;
+
+use osteon_common::case::Setup;
+use osteon_common::check;
+use osteon_common::field_path::{element_path, quoted};
+use osteon_common::fields::Choice;
+use osteon_common::limits;
+use osteon_common::signal_layout::{SignalAxis, SignalLayout, Transmitter};
+
+use crate::document::Format;
+use crate::document_text::DocumentText;
+use crate::file_error::{ContentError, FileError, Invalid, SizeLimit};
+use crate::input_file::InputFile;
+use crate::job_file;
+use crate::reader::{self, Reader, Table};
+
+/// Limit of a probe file's length, as of a case file's.
+const SIZE_LIMIT: SizeLimit =
+    SizeLimit { bytes: limits::CASE_FILE_BYTES_MAX, suffices_for: "any probe file needs" };
+/// The sections of a case file that say nothing of a measurement; they are not read, so that a case may
+/// describe its own traces.
+const PASSED_OVER: [&str; 2] = ["solver", "bone"];
+
+/// What a probe file says.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ProbeDescription {
+    /// Probe, layers and criterion.
+    pub setup: Setup,
+    /// How its signals are recorded.
+    pub signals: SignalLayout,
+}
+
+/// Reads and validates the probe file at `path`; its extension determines the format.
+///
+/// # Errors
+/// If the file cannot be read, is malformed, or violates a rule; all violations are reported at once.
+pub fn read(path: &Path) -> Result<ProbeDescription, FileError> {
+    let input = InputFile::open(path, SIZE_LIMIT, Vec::new())?;
+    let read = of_document(input.document(), input.directory());
+    read.map_err(|content| FileError::Content { path: input.path().to_owned(), content })
+}
+
+/// Reads and validates the text of a probe file. Names of files in it are relative to the current directory.
+///
+/// # Errors
+/// If the text is malformed or violates a rule; all violations are reported at once.
+pub fn parse(text: &str, format: Format) -> Result<ProbeDescription, ContentError> {
+    of_document(DocumentText::new(text, format), Path::new(""))
+}
+
+fn of_document(
+    document: DocumentText<'_>,
+    directory: &Path,
+) -> Result<ProbeDescription, ContentError> {
+    let root = document.tree()?;
+    let mut reader = Reader::default();
+    let [solver, bone] = PASSED_OVER;
+    let table = reader.root(&root, &["layers", "probe", "picking", "signals", solver, bone]);
+    let refused = |reader: &Reader| -> Result<_, ContentError> {
+        let refused: Invalid = reader.refuse(document, &root);
+        Err(refused.into())
+    };
+    if !table.is_table() {
+        return refused(&reader);
+    }
+    // The solver's settings are read with the others, and mean nothing here.
+    let setup = job_file::setup(&mut reader, &table, directory);
+    let mut signals = SignalLayout::default();
+    let section = reader::section(&mut reader, &table, "signals", &mut signals);
+    let given = names(&mut reader, &section, SignalLayout::AXES.name, SignalAxis::Time);
+    signals.axes = given.unwrap_or(signals.axes);
+    let given = names(&mut reader, &section, SignalLayout::TRANSMITTERS.name, Transmitter::First);
+    signals.transmitters = given.unwrap_or(signals.transmitters);
+    check::setup(&setup, &mut reader.violations);
+    check::signals(&signals, &mut reader.violations);
+    if !reader.violations.is_empty() {
+        return refused(&reader);
+    }
+    Ok(ProbeDescription { setup, signals })
+}
+
+/// Reads the list `key` of choices, each as `any` is; `None` if it is absent, or one of them is no such choice.
+fn names<T: Choice + Copy>(
+    reader: &mut Reader,
+    table: &Table<'_>,
+    key: &str,
+    any: T,
+) -> Option<Vec<T>> {
+    let accepted: Vec<_> = any.names().iter().map(|name| format!("\"{name}\"")).collect();
+    let accepted = accepted.join(", ");
+    let nodes = reader.list(table, key, &format!("a list of {accepted}"))?;
+    let path = table.path(key);
+    let texts = reader.texts(&path, nodes)?;
+    if texts.is_empty() || texts.len() > limits::SIGNAL_AXES_MAX {
+        let count = texts.len();
+        let most = limits::SIGNAL_AXES_MAX;
+        reader.violations.add(path, format!("has {count} elements; it must have 1 to {most}"));
+        return None;
+    }
+    let mut found = Vec::with_capacity(texts.len());
+    for (index, text) in texts.into_iter().enumerate() {
+        let mut one = any;
+        if one.choose(text) {
+            found.push(one);
+        } else {
+            let message = format!("is {}; it must be one of {accepted}", quoted(text));
+            reader.violations.add(element_path(&path, index), message);
+        }
+    }
+    (found.len() == nodes.len()).then_some(found)
+}
