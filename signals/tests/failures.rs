@@ -1,6 +1,6 @@
 //! What is found in signals that are spoilt in one way.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+#![expect(clippy::panic, clippy::unwrap_used, reason = "a test that cannot go on should say where")]
 
 mod support;
 
