@@ -3,8 +3,11 @@
 mod array_file;
 mod description;
 mod npy;
+mod npz;
+mod signal_content;
 mod traces_csv;
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use osteon_common::limits::FILE_BYTES_MAX;
@@ -15,14 +18,13 @@ use crate::array_signals::{ArraySignals, SignalSeries};
 use crate::reading_error::{SignalFault, SignalFileError};
 
 use self::array_file::{ArrayFile, SeriesBlock};
-use self::traces_csv::TraceTable;
+use self::signal_content::SignalContent;
 
 pub use self::description::RecognizedSignals;
 pub(crate) use self::description::usual_axes;
 
 /// How files begin that are recognized and not read, and what they are.
-const OTHERS: [(&[u8], &str); 6] = [
-    (b"PK", "a ZIP archive or workbook"),
+const OTHERS: [(&[u8], &str); 5] = [
     (b"\x1f\x8b", "compressed by gzip"),
     (b"MATLAB", "a MATLAB file"),
     (b"\x89HDF", "an HDF5 file"),
@@ -35,12 +37,6 @@ const OTHERS: [(&[u8], &str); 6] = [
 pub struct SignalFile {
     path: PathBuf,
     content: SignalContent,
-}
-
-#[derive(Debug)]
-enum SignalContent {
-    Table(TraceTable),
-    Array(ArrayFile),
 }
 
 impl SignalFile {
@@ -109,6 +105,13 @@ fn content(path: &Path) -> Result<SignalContent, SignalFault> {
     if let Some(array) = ArrayFile::recognize(file)? {
         return Ok(SignalContent::Array(array));
     }
+    let mut begin = Vec::new();
+    user_file::open(path)?.take(2).read_to_end(&mut begin)?;
+    if begin.as_slice() == b"PK" {
+        let max = npz::ARCHIVE_BYTES_MAX;
+        let archive = user_file::read(path, max)?.ok_or(SignalFault::TooLarge { max })?;
+        return archived(&archive).map(SignalContent::Array);
+    }
     let bytes = user_file::read(path, FILE_BYTES_MAX)?
         .ok_or(SignalFault::TooLarge { max: FILE_BYTES_MAX })?;
     if let Some((_, what)) = OTHERS.iter().find(|(begin, _)| bytes.starts_with(begin)) {
@@ -118,6 +121,24 @@ fn content(path: &Path) -> Result<SignalContent, SignalFault> {
         what: "neither text in UTF-8 nor an array".to_owned(),
     })?;
     traces_csv::parse(&text).map(SignalContent::Table)
+}
+
+/// Returns the array of signals in an archive: the only one, or the only one with several axes.
+fn archived(archive: &[u8]) -> Result<ArrayFile, SignalFault> {
+    let arrays = npz::arrays(archive)?;
+    let names: Vec<String> = arrays.iter().map(|array| array.name.clone()).collect();
+    let arrays: Vec<_> = arrays.into_iter().map(|array| ArrayFile::of_bytes(array.bytes)).collect();
+    let mut arrays: Vec<ArrayFile> = arrays.into_iter().collect::<Result<_, _>>()?;
+    if arrays.len() > 1 {
+        arrays.retain(|array| array.shape().len() > 1);
+    }
+    match (arrays.pop(), arrays.is_empty()) {
+        (Some(only), true) => Ok(only),
+        _ => Err(SignalFault::damaged(format!(
+            "it has the arrays [{}]; it must have one with several axes, that of the signals",
+            names.join(", ")
+        ))),
+    }
 }
 
 /// Refuses a series with numbers that are none, or without any signal.

@@ -38,7 +38,7 @@ pub enum SignalFault {
         max: u64,
     },
     /// It is of no kind that is read.
-    #[error("is {what}; signals are read from CSV, NPY, NPZ and MATLAB files")]
+    #[error("is {what}; signals are read from CSV, NPY and NPZ files")]
     OtherKind {
         /// What it is, or seems to be.
         what: String,

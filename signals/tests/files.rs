@@ -181,6 +181,11 @@ fn what_is_wrong_with_an_array_is_said() {
     refused(&good, |probe| probe.signals.band = vec![1.0, 3e6], "signals.band is [1.0, 3000000.0]");
     let absurd = npy("<f8", false, &[usize::MAX / 4, 14, 800], &[]);
     refused(&absurd, none, "is damaged: its shape is");
-    refused(b"PK\x03\x04", none, "is a ZIP archive or workbook; signals are read from");
+    refused(b"PK\x03\x04", none, "is damaged: its directory of arrays is missing or cut off");
+    refused(
+        b"MATLAB 5.0 MAT-file",
+        none,
+        "is a MATLAB file; signals are read from CSV, NPY and NPZ files",
+    );
     refused(b"\xff\xfe\x00", none, "is neither text in UTF-8 nor an array");
 }

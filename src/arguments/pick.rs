@@ -8,7 +8,7 @@ use clap::Args;
 #[derive(Debug, Args)]
 pub(crate) struct PickArguments {
     /// Files of signals: CSV with the column time (s) and a column for each receiver, headed by its x1 (m), as
-    /// `osteon simulate --out` writes them; or arrays of NumPy (.npy)
+    /// `osteon simulate --out` writes them; or arrays of NumPy (.npy, .npz)
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
     /// Probe file (TOML or JSON): [probe], [layers] and [picking] as in a case file, and [signals] [default: the

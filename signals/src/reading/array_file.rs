@@ -13,10 +13,19 @@ use crate::reading_error::SignalFault;
 /// Bytes that contain the header of every array.
 const HEADER_BYTES: u64 = (1 << 16) + 16;
 
+/// Where the bytes of an array are.
+#[derive(Debug)]
+enum ArrayBytes {
+    /// In a file, from which they are read when they are needed.
+    File(File),
+    /// In memory.
+    Memory(Vec<u8>),
+}
+
 /// An array that is read when it is needed.
 #[derive(Debug)]
 pub(crate) struct ArrayFile {
-    file: File,
+    bytes: ArrayBytes,
     header: ArrayHeader,
     /// All numbers, if the series are not one after the other.
     whole: Option<Vec<f64>>,
@@ -41,15 +50,27 @@ impl ArrayFile {
         if !start.starts_with(b"\x93NUMPY") {
             return Ok(None);
         }
-        let header = npy::header(&start)?;
         let found = file.metadata()?.len();
+        Self::new(&start, found, ArrayBytes::File(file)).map(Some)
+    }
+
+    /// Takes the bytes of an array of NumPy.
+    ///
+    /// # Errors
+    /// If they are none, or damaged.
+    pub(crate) fn of_bytes(bytes: Vec<u8>) -> Result<Self, SignalFault> {
+        let start = bytes[..bytes.len().min(HEADER_BYTES as usize)].to_vec();
+        Self::new(&start, bytes.len() as u64, ArrayBytes::Memory(bytes))
+    }
+
+    /// Takes an array of `found` bytes that begins with those of `start`.
+    fn new(start: &[u8], found: u64, bytes: ArrayBytes) -> Result<Self, SignalFault> {
+        let header = npy::header(start)?;
         let expected = header
             .count()
             .and_then(|count| count.checked_mul(header.numbers.size)?.checked_add(header.data));
         match expected {
-            Some(expected) if expected as u64 == found => {
-                Ok(Some(Self { file, header, whole: None }))
-            }
+            Some(expected) if expected as u64 == found => Ok(Self { bytes, header, whole: None }),
             Some(expected) => Err(SignalFault::damaged(format!(
                 "it has {found} bytes, and an array of the shape {:?} has {expected}",
                 header.shape
@@ -129,10 +150,18 @@ impl ArrayFile {
             ));
         }
         let size = self.header.numbers.size;
-        let mut bytes = vec![0; count * size];
         let offset = self.header.data + first * size;
-        self.file.read_exact_at(&mut bytes, offset as u64)?;
-        Ok(self.header.numbers.decode(&bytes))
+        match &self.bytes {
+            ArrayBytes::File(file) => {
+                let mut bytes = vec![0; count * size];
+                file.read_exact_at(&mut bytes, offset as u64)?;
+                Ok(self.header.numbers.decode(&bytes))
+            }
+            ArrayBytes::Memory(bytes) => {
+                let part = bytes.get(offset..offset + count * size).unwrap_or_default();
+                Ok(self.header.numbers.decode(part))
+            }
+        }
     }
 }
 

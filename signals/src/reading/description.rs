@@ -4,7 +4,7 @@ use osteon_common::limits::SIGNAL_LENGTH_MAX;
 use osteon_common::signal_layout::{SignalAxis, SignalLayout};
 use osteon_files::probe_file::ProbeDescription;
 
-use super::SignalContent;
+use super::signal_content::SignalContent;
 use super::traces_csv::TraceTable;
 use crate::array_geometry::ArrayGeometry;
 use crate::interpolation::HALF_WIDTH;
