@@ -1,5 +1,7 @@
 //! The velocity along the array for one source.
 
+use std::f64::consts::PI;
+
 use osteon_common::signal_layout::SignalLayout;
 use osteon_solver::picking::{RESIDUAL_PERIODS_MAX, median};
 
@@ -14,6 +16,11 @@ use crate::receiver_signal::{ArrivalSpan, NOISE_FLOOR, ReceiverSignal};
 
 /// Largest standard error of a time, in periods: beyond it the noise decides where the extremum is.
 const ERROR_PERIODS_MAX: f64 = 0.08;
+/// Largest curvature of the noise, relative to that of a wave of the centre frequency and the extremum's size:
+/// beyond it the noise makes extrema of its own on the top of the wave, and the largest of them is picked.
+const NOISE_CURVATURE_MAX: f64 = 1.0;
+/// Upper edge, in centre frequencies, of the filter that is recommended.
+const BAND_EDGE: f64 = 2.5;
 /// Fewest receivers of a velocity.
 const RECEIVERS_MIN: usize = 3;
 
@@ -56,7 +63,14 @@ pub(crate) fn pick_direction(
 ) -> DirectionPick {
     let signals = signals(geometry, layout, recorded, raw);
     let mut receivers = vec![ReceiverPick::default(); signals.len()];
-    let estimate = estimate(geometry, &signals, &mut receivers);
+    let mut estimate = estimate(geometry, &signals, &mut receivers);
+    if let Err(refusal) = &mut estimate
+        && refusal.failure == PickFailure::TooNoisy
+        && layout.band.is_empty()
+    {
+        let edge = BAND_EDGE * geometry.center_frequency;
+        refusal.detail += &format!("; [signals] band = [0.0, {edge:?}] filters noise");
+    }
     DirectionPick { estimate, receivers }
 }
 
@@ -112,10 +126,13 @@ fn estimate(
         }
         match decision.pick(r) {
             Ok(pick) => {
-                let slope = signals[r].noise.map_or(0.0, |noise| noise.slope);
+                let noise = signals[r].noise.unwrap_or_default();
                 receiver.time = Some(pick.at.time);
-                receiver.standard_error = slope / pick.curvature.abs();
-                let is_noisy = receiver.standard_error > ERROR_PERIODS_MAX * period;
+                receiver.standard_error = noise.slope / pick.curvature.abs();
+                let turns = 2.0 * PI * geometry.center_frequency;
+                let usual = pick.at.pressure.abs() * turns * turns;
+                let is_noisy = receiver.standard_error > ERROR_PERIODS_MAX * period
+                    || noise.curvature > NOISE_CURVATURE_MAX * usual;
                 receiver.failure = is_noisy.then_some(PickFailure::TooNoisy);
             }
             Err(failure) => receiver.failure = Some(failure),

@@ -1,6 +1,6 @@
 //! The signal of one receiver: its noise, its extrema before the direct wave, and whether it is usable.
 
-use osteon_solver::picking::{PACKET_PERIODS, Window};
+use osteon_solver::picking::{PACKET_PERIODS, Window, median};
 
 use crate::band_filter::BandFilter;
 use crate::interpolation::{self, CurvedExtremum, SampleSlopes};
@@ -15,16 +15,22 @@ const NOISE_PERIODS_MIN: f64 = 1.5;
 /// shorter ones at the top of a wave.
 const CLIPPED_PERIODS: f64 = 0.12;
 const CLIPPED_SAMPLES_MIN: usize = 4;
+/// Ratio of the standard deviation of a normal distribution to the median of its modulus.
+const NORMAL_MEDIAN: f64 = 1.482_602_218_505_602;
+/// Noise with a standard deviation beyond this multiple of the one by its median is not of one kind.
+const UNEVEN_NOISE: f64 = 2.5;
 /// Most extrema of a packet, the largest, that are compared with those of other receivers.
 const PACKET_MAX: usize = 16;
 
 /// Standard deviations of the noise.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct NoiseSize {
     /// Of the signal.
     pub(crate) value: f64,
     /// Of its slope, per s.
     pub(crate) slope: f64,
+    /// Of its curvature, per s².
+    pub(crate) curvature: f64,
 }
 
 /// The part of the time axis that matters, s.
@@ -143,16 +149,25 @@ fn noise_of(
     step: f64,
     slopes: &SampleSlopes,
 ) -> NoiseSize {
-    let count = quiet.len() as f64;
-    let (mut values, mut rates) = (0.0_f64, 0.0_f64);
     // A slope takes samples on both sides, of which those after the earliest arrival still are noise: even
     // the fastest wave begins gently.
-    for index in quiet {
-        let slope = slopes.at(samples, index);
-        values = samples[index].mul_add(samples[index], values);
-        rates = slope.mul_add(slope, rates);
+    let rates: Vec<f64> = quiet.clone().map(|index| slopes.at(samples, index)).collect();
+    let bends: Vec<f64> = rates.windows(2).map(|two| two[1] - two[0]).collect();
+    NoiseSize {
+        value: deviation(&samples[quiet]),
+        slope: deviation(&rates) / step,
+        curvature: deviation(&bends) / (step * step),
     }
-    NoiseSize { value: (values / count).sqrt(), slope: (rates / count).sqrt() / step }
+}
+
+/// Returns the standard deviation of values about 0: the root of their mean square, unless a part of them is far
+/// larger than the rest, as when the pulse couples into the receiver; then that of the rest, from the median.
+fn deviation(values: &[f64]) -> f64 {
+    let square = values.iter().fold(0.0, |sum: f64, value| value.mul_add(*value, sum));
+    let all = (square / values.len().max(1) as f64).sqrt();
+    let mut sizes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
+    let rest = NORMAL_MEDIAN * median(&mut sizes);
+    if all > UNEVEN_NOISE * rest && rest > 0.0 { rest } else { all }
 }
 
 /// Returns the first sample that is clipped: of full size, or one of many equal ones at the largest or the

@@ -141,6 +141,35 @@ fn noise_that_hides_the_first_extremum_is_refused() {
     );
 }
 
+/// Without a filter noise of high frequency has extrema of its own on the top of each wave.
+#[test]
+fn noise_that_should_be_filtered_is_refused_with_the_filter() {
+    let noisy = with_noise(&CLEAN, 0.01 * packet_peak(&CLEAN), 3);
+    let refusal = pick(&description(None), &noisy).estimate.unwrap_err();
+    assert_eq!(refusal.failure, PickFailure::TooNoisy);
+    assert!(
+        refusal.detail.ends_with("[signals] band = [0.0, 2500000.0] filters noise"),
+        "{refusal:?}"
+    );
+}
+
+/// The pulse couples into the receivers before any wave arrives.
+#[test]
+fn crosstalk_is_no_noise() {
+    let mut noisy = with_noise(&CLEAN, 0.01 * packet_peak(&CLEAN), 3);
+    let probe = description(Some([0.0, 2.5e6]));
+    let before = pick(&probe, &noisy).estimate.unwrap();
+    for samples in &mut noisy.directions[0].receivers {
+        for (j, sample) in samples.iter_mut().enumerate().take(60) {
+            *sample += 300.0 * libm::sin(0.25 * j as f64);
+        }
+    }
+    let after = pick(&probe, &noisy).estimate.unwrap();
+    assert!((after.velocity - before.velocity).abs() < 0.5 * before.standard_error);
+    let ratio = after.standard_error / before.standard_error;
+    assert!((0.5..2.0).contains(&ratio), "{ratio}");
+}
+
 /// Both directions of a tilted probe: each is off by four per cent, and their harmonic mean is the solver's.
 #[test]
 fn two_directions_cancel_a_tilt() {
