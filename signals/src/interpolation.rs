@@ -12,6 +12,8 @@ use osteon_solver::picking::PressureExtremum;
 
 /// Samples on each side of a time that contribute to the signal there.
 pub(crate) const HALF_WIDTH: usize = 32;
+/// Samples at each end of a record in which its mirror image is felt.
+pub(crate) const EDGE: usize = 8;
 /// Standard deviation of the Gaussian window, samples: it falls to 1e-8 at its ends.
 const WIDTH: f64 = HALF_WIDTH as f64 / 6.07;
 /// The window at whole distances from a sample.
@@ -37,9 +39,18 @@ pub(crate) struct CurvedExtremum {
     pub(crate) curvature: f64,
 }
 
-/// Returns the indices of samples around which the signal is known: those with enough others on both sides.
+/// Returns a signal continued at both ends by [`HALF_WIDTH`] samples of its mirror image.
+pub(crate) fn continued(samples: &[f64]) -> Vec<f64> {
+    let inner = samples.get(1..samples.len().saturating_sub(1)).unwrap_or_default();
+    let before = inner.iter().take(HALF_WIDTH).rev();
+    let after = inner.iter().rev().take(HALF_WIDTH);
+    before.chain(samples).chain(after).copied().collect()
+}
+
+/// Returns the indices of a [`continued`] signal that are at least [`EDGE`] samples away from its own ends.
 pub(crate) fn interior(length: usize) -> std::ops::Range<usize> {
-    HALF_WIDTH..length.saturating_sub(HALF_WIDTH).max(HALF_WIDTH)
+    let edge = HALF_WIDTH + EDGE;
+    edge..length.saturating_sub(edge).max(edge)
 }
 
 /// Returns the shape at `place` (in steps from the first sample). Beyond its ends the signal is 0.

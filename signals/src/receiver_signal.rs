@@ -1,9 +1,11 @@
 //! The signal of one receiver: its noise, its extrema before the direct wave, and whether it is usable.
 
-use osteon_solver::picking::{PACKET_PERIODS, Window, median};
+use std::ops::Range;
+
+use osteon_solver::picking::{PACKET_PERIODS, Window, mean};
 
 use crate::band_filter::BandFilter;
-use crate::interpolation::{self, CurvedExtremum, SampleSlopes};
+use crate::interpolation::{self, CurvedExtremum, HALF_WIDTH, SampleSlopes};
 use crate::pick_failure::PickFailure;
 
 /// Extrema below this multiple of the noise's standard deviation do not open a packet. Of a thousand independent
@@ -15,9 +17,8 @@ const NOISE_PERIODS_MIN: f64 = 1.5;
 /// shorter ones at the top of a wave.
 const CLIPPED_PERIODS: f64 = 0.12;
 const CLIPPED_SAMPLES_MIN: usize = 4;
-/// Ratio of the standard deviation of a normal distribution to the median of its modulus.
-const NORMAL_MEDIAN: f64 = 1.482_602_218_505_602;
-/// Noise with a standard deviation beyond this multiple of the one by its median is not of one kind.
+/// Ratio of the standard deviation of the record before the first arrival to that of its later half beyond which
+/// the rest of it is no noise.
 const UNEVEN_NOISE: f64 = 2.5;
 /// Most extrema of a packet, the largest, that are compared with those of other receivers.
 const PACKET_MAX: usize = 16;
@@ -73,16 +74,23 @@ impl ReceiverSignal {
         full_scale: Option<f64>,
         slopes: &SampleSlopes,
     ) -> Self {
-        let mut samples = filter.map_or_else(|| raw.to_vec(), |filter| filter.apply(raw));
+        let clipped_from = first_clipped(raw, 1.0 / (span.center_frequency * step), full_scale)
+            .map_or(f64::INFINITY, |index| (index as f64).mul_add(step, start));
+        let mut samples = match filter {
+            Some(filter) => interpolation::continued(&filter.apply(raw)),
+            None => interpolation::continued(raw),
+        };
+        let start = (HALF_WIDTH as f64).mul_add(-step, start);
         let index = |time: f64| ((time - start) / step).clamp(0.0, samples.len() as f64) as usize;
         let inside = interpolation::interior(samples.len());
-        let before = inside.start.max(filter.map_or(0, BandFilter::unsettled));
+        let before = inside.start + filter.map_or(0, BandFilter::unsettled);
         let from = index(span.earliest).max(inside.start);
         let to = index(span.direct).min(inside.end.saturating_sub(1));
         let period = 1.0 / (span.center_frequency * step);
         let quiet = before..from.min(inside.end).max(before);
         let noise = (quiet.len() as f64 >= NOISE_PERIODS_MIN * period).then(|| {
-            let mean = samples[quiet.clone()].iter().sum::<f64>() / quiet.len() as f64;
+            let quiet = of_one_kind(&samples, quiet);
+            let mean = mean(&samples[quiet.clone()]);
             samples.iter_mut().for_each(|sample| *sample -= mean);
             noise_of(&samples, quiet, step, slopes)
         });
@@ -95,10 +103,7 @@ impl ReceiverSignal {
             false => Vec::new(),
         };
         let largest = raw.iter().fold(0.0, |max: f64, sample| max.max(sample.abs()));
-        let clipped = first_clipped(raw, period, full_scale);
         let last = samples.get(to).map_or(0.0, |sample| sample.abs());
-        let clipped_from =
-            clipped.map_or(f64::INFINITY, |index| (index as f64).mul_add(step, start));
         Self { samples, start, step, noise, extrema, last, clipped_from, largest }
     }
 
@@ -143,12 +148,7 @@ impl ReceiverSignal {
     }
 }
 
-fn noise_of(
-    samples: &[f64],
-    quiet: std::ops::Range<usize>,
-    step: f64,
-    slopes: &SampleSlopes,
-) -> NoiseSize {
+fn noise_of(samples: &[f64], quiet: Range<usize>, step: f64, slopes: &SampleSlopes) -> NoiseSize {
     // A slope takes samples on both sides, of which those after the earliest arrival still are noise: even
     // the fastest wave begins gently.
     let rates: Vec<f64> = quiet.clone().map(|index| slopes.at(samples, index)).collect();
@@ -160,14 +160,22 @@ fn noise_of(
     }
 }
 
-/// Returns the standard deviation of values about 0: the root of their mean square, unless a part of them is far
-/// larger than the rest, as when the pulse couples into the receiver; then that of the rest, from the median.
+/// Returns a range of samples, or its later half if the signals there are much smaller, as when the pulse couples
+/// into the receiver.
+fn of_one_kind(samples: &[f64], range: Range<usize>) -> Range<usize> {
+    let later = range.start.midpoint(range.end)..range.end;
+    let scatter = |range: &Range<usize>| {
+        let part = &samples[range.clone()];
+        let middle = mean(part);
+        deviation(&part.iter().map(|sample| sample - middle).collect::<Vec<_>>())
+    };
+    if scatter(&range) > UNEVEN_NOISE * scatter(&later) { later } else { range }
+}
+
+/// Returns the root of the mean square.
 fn deviation(values: &[f64]) -> f64 {
     let square = values.iter().fold(0.0, |sum: f64, value| value.mul_add(*value, sum));
-    let all = (square / values.len().max(1) as f64).sqrt();
-    let mut sizes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
-    let rest = NORMAL_MEDIAN * median(&mut sizes);
-    if all > UNEVEN_NOISE * rest && rest > 0.0 { rest } else { all }
+    (square / values.len().max(1) as f64).sqrt()
 }
 
 /// Returns the first sample that is clipped: of full size, or one of many equal ones at the largest or the

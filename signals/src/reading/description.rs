@@ -7,7 +7,7 @@ use osteon_files::probe_file::ProbeDescription;
 use super::signal_content::SignalContent;
 use super::traces_csv::TraceTable;
 use crate::array_geometry::ArrayGeometry;
-use crate::interpolation::HALF_WIDTH;
+use crate::interpolation::{EDGE, HALF_WIDTH};
 use crate::reading_error::SignalFault;
 
 /// Fewest samples in a period of the centre frequency.
@@ -215,7 +215,7 @@ fn record(
     let transmitters = description.signals.transmitters.iter();
     for &transmitter in transmitters {
         let geometry = ArrayGeometry::new(&description.setup, transmitter);
-        let edge = HALF_WIDTH as f64 * step;
+        let edge = EDGE as f64 * step;
         let (from, to) = (start + edge, start + (samples - 1) as f64 * step - edge);
         let first = geometry.earliest.iter().copied().fold(f64::INFINITY, f64::min);
         let last = geometry.direct.iter().copied().fold(0.0, f64::max);
@@ -226,7 +226,7 @@ fn record(
                 format!(
                     "or another key is wrong: the record is from {start:e} s to {:e} s after the pulse begins, \
                      and first arrivals are between {first:.2e} s and {last:.2e} s, before and after which \
-                     {HALF_WIDTH} samples are needed",
+                     {EDGE} samples are needed",
                     to + edge
                 ),
             ));
