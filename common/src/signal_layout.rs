@@ -132,7 +132,7 @@ pub struct SignalLayout {
     pub axes: Vec<SignalAxis>,
     /// Time between samples, s, above 0; `None`: the file's column of times says it.
     pub sampling_interval: Option<f64>,
-    /// Time of an array's first sample after the pulse begins, s.
+    /// Time of an array's first sample after the pulse begins, s; added to the times of a table.
     pub start: f64,
     /// Unit of a file's column of times.
     pub time_unit: TimeUnit,
@@ -185,7 +185,8 @@ impl Section for SignalLayout {
             &mut self.sampling_interval,
             Number::above_zero(&TIME_STEP),
         );
-        let start = "time of an array's first sample after the pulse begins";
+        let start =
+            "time of an array's first sample after the pulse begins; added to the times of a table";
         fields.number(
             Key { name: "start", meaning: start },
             &mut self.start,

@@ -111,3 +111,48 @@ fn names<T: Choice + Copy>(
     }
     (found.len() == nodes.len()).then_some(found)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(text: &str, expected: &str) {
+        let found = match parse(text, Format::Toml) {
+            Ok(ProbeDescription { setup, signals }) => format!(
+                "{} receivers, {:?}, {:?}, {:?}",
+                setup.probe.receivers.count, signals.axes, signals.band, signals.transmitters
+            ),
+            Err(error) => error.to_string(),
+        };
+        assert!(found.contains(expected), "{text}\n{found}");
+    }
+
+    #[test]
+    fn sections_of_a_case_and_signals_are_read() {
+        check("", "14 receivers, [], [], [First]");
+        check(
+            "[probe.receivers]\ncount = 5\n[signals]\naxes = [\"receiver\", \"time\"]\nband = [0, 3e6]\n\
+             transmitters = [\"second\", \"first\"]\n[bone]\ndensity = 1.0\n",
+            "5 receivers, [Receiver, Time], [0.0, 3000000.0], [Second, First]",
+        );
+    }
+
+    #[test]
+    fn every_violation_is_reported() {
+        for (text, expected) in [
+            ("[signals]\naxes = []", "signals.axes: has 0 elements; it must have 1 to 4"),
+            ("[signals]\naxes = [\"time\", \"time\"]", "signals.axes: has \"time\" 2 times"),
+            ("[signals]\naxes = \"time\"", "it must be a list of \"series\", \"transmitter\""),
+            ("[signals]\naxes = [1]", "signals.axes[0]: is 1; it must be a text in quotes"),
+            ("[signals]\nband = [3e6, 1e6]", "its first frequency must be below its second"),
+            ("[signals]\nband = [-1.0, 1e6]", "signals.band[0]: is -1"),
+            ("[signals]\nsampling_interval = 0.0", "signals.sampling_interval: is 0"),
+            ("[signals]\ntime_unit = \"min\"", "it must be \"s\" or \"ms\" or \"us\" or \"ns\""),
+            ("[signals]\nfull_scale = -1.0", "signals.full_scale: is -1"),
+            ("[probe]\ncentre_frequency = 1e6", "did you mean `center_frequency`?"),
+            ("[parameters]\n", "parameters: unknown key"),
+        ] {
+            check(text, expected);
+        }
+    }
+}
