@@ -7,6 +7,7 @@ mod jobs;
 mod modes;
 mod noun;
 mod operators;
+mod pick;
 mod realizations;
 pub(crate) mod services;
 mod tools;
@@ -33,6 +34,7 @@ pub(crate) use operators::{
     BackupArguments, CoordinatorCommand, DrainArguments, HealthArguments, UnbanArguments,
     WorkerCommand, WorkerListArguments,
 };
+pub(crate) use pick::PickArguments;
 pub(crate) use realizations::{DesignArguments, DrawArguments, ObserveArguments, PlaceArguments};
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use tools::{
@@ -60,6 +62,8 @@ pub(crate) enum Command {
     Propagate(RunArguments),
     /// Solve one case: picked times, velocity, and with --out the pressure traces
     Simulate(SimulateArguments),
+    /// Pick the velocities of the first arriving signals in recorded or simulated signals
+    Pick(PickArguments),
     /// Compute all guided waves of a case's bone at one or several frequencies
     Modes(ModesArguments),
     /// Check a job file, and estimate what the job costs on this machine

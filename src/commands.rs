@@ -13,6 +13,7 @@ mod materials;
 mod modes;
 mod observe;
 mod operators;
+mod pick;
 mod run;
 mod schema;
 mod simulate;
@@ -45,6 +46,9 @@ fn prepare_command(
             "no results were saved",
             simulate::simulate(arguments, isa()?),
         ),
+        Command::Pick(arguments) => {
+            PreparedCommand::interruptible("no file was written", pick::pick(arguments))
+        }
         Command::Modes(arguments) => PreparedCommand::interruptible(
             "no files were written",
             modes::modes(arguments, isa()?, context.cores),

@@ -207,10 +207,11 @@ fn run_in(scratch: &Scratch, command: &str) {
 }
 
 /// The pages for users that show files and commands, with the least number of commands of each.
-const GUIDES: [(&str, usize); 14] = [
+const GUIDES: [(&str, usize); 15] = [
     ("docs/quick-start.md", 5),
     ("docs/tutorial.md", 3),
     ("docs/how-to-csv.md", 3),
+    ("docs/how-to-pick.md", 5),
     ("docs/how-to-observables.md", 2),
     ("docs/how-to-attenuation.md", 3),
     ("docs/how-to-porosity.md", 2),
@@ -267,6 +268,10 @@ fn check_guide(page: &str, scratch: &Scratch) {
         "docs/how-to-csv.md" => {
             let job = read("messung/job.toml");
             assert!(job.contains("3871.0, 3923.0, 3899.0, 3951.0, 3884.0"), "{job}");
+        }
+        "docs/how-to-pick.md" => {
+            let velocities = column(&scratch.path("velocities.csv"), "velocity");
+            assert!((velocities[0] - 3908.755).abs() < 0.5, "{velocities:?}");
         }
         "docs/how-to-reproduce.md" => {
             assert_eq!(json("original/result.json"), json("again/result.json"));

@@ -51,7 +51,7 @@ fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
     let allowed = [
         (
             "osteon",
-            "client common coordinator files local proto search slurm solver transport umbridge worker",
+            "client common coordinator files local proto search signals slurm solver transport umbridge worker",
         ),
         ("osteon-client", "common coordinator files proto report transport"),
         ("osteon-coordinator", "common files http proto report search transport"),
@@ -61,6 +61,7 @@ fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
         ("osteon-python", "common files proto solver"),
         ("osteon-report", "common files"),
         ("osteon-search", "common"),
+        ("osteon-signals", "common files solver"),
         ("osteon-slurm", "client common proto transport"),
         ("osteon-solver", "common"),
         ("osteon-study", "common local search solver"),

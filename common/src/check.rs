@@ -17,6 +17,7 @@ mod range;
 mod section;
 mod setup;
 mod setup_parameters;
+mod signals;
 mod systematic;
 mod value;
 
@@ -30,6 +31,7 @@ pub use self::porosity::{porosity, porosity_model};
 pub use self::posterior::posterior;
 pub use self::random_quantities::random_quantities;
 pub use self::setup::setup;
+pub use self::signals::signals;
 pub use self::value::{number, quantity};
 
 impl JobSpecification {

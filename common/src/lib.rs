@@ -62,6 +62,7 @@ mod search_settings;
 pub mod settings;
 pub mod setup_quantity;
 pub mod shift;
+pub mod signal_layout;
 mod sobol;
 pub mod special;
 pub mod statistics;

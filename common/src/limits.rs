@@ -130,3 +130,9 @@ pub const BACKUP_SECONDS_MAX: u64 = 3600;
 pub const READER_STALL_SECONDS_MAX: u64 = 30;
 /// Largest priority value of a job. Priorities order only the jobs of one client.
 pub const PRIORITY_MAX: u32 = 9;
+/// Maximum number of axes of an array of signals: series, transmitter, receiver, time.
+pub const SIGNAL_AXES_MAX: usize = 4;
+/// Maximum number of samples of all signals of one file, which takes 512 MB.
+pub const SIGNAL_SAMPLES_MAX: u64 = 1 << 26;
+/// Maximum number of samples of one signal.
+pub const SIGNAL_LENGTH_MAX: usize = 1 << 20;

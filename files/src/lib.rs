@@ -20,6 +20,7 @@ pub mod input_file;
 pub mod job_file;
 pub mod materials;
 pub mod posterior_csv;
+pub mod probe_file;
 mod pulse;
 mod pulse_file;
 mod reader;

@@ -26,7 +26,7 @@ mod isa;
 mod lanes;
 mod media;
 mod medium;
-mod picking;
+pub mod picking;
 mod pulse;
 mod quadrature;
 mod solver;

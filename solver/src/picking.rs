@@ -1,5 +1,7 @@
 //! The first arriving signal: one extremum, the same at every receiver, and the line through its
 //! times.
+//!
+//! Which extremum that is decides [`array_rank`], for computed pressures and measured signals alike.
 
 use osteon_common::case::Setup;
 use osteon_common::outcome::FailureKind;
@@ -9,28 +11,28 @@ use crate::failure::Failure;
 use crate::pulse::relative_onset;
 
 /// An extremum below this fraction of the window's largest one is numerical noise.
-pub(crate) const FLOOR: f64 = 1e-3;
+pub const FLOOR: f64 = 1e-3;
 /// A packet's peak is searched for up to this many periods of the centre frequency after an extremum.
-pub(crate) const PACKET_PERIODS: f64 = 1.2;
+pub const PACKET_PERIODS: f64 = 1.2;
 /// Largest distance of a pick from the line, in periods of the centre frequency.
-const RESIDUAL_PERIODS_MAX: f64 = 0.05;
+pub const RESIDUAL_PERIODS_MAX: f64 = 0.05;
 
 /// A local extremum of the pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PressureExtremum {
+pub struct PressureExtremum {
     /// Time, s.
-    pub(crate) time: f64,
-    /// Pressure, Pa.
-    pub(crate) pressure: f64,
+    pub time: f64,
+    /// Pressure, Pa; of a measured signal in its own unit.
+    pub pressure: f64,
 }
 
 /// The signal at one receiver before the direct wave can arrive.
 #[derive(Debug, Default)]
-pub(crate) struct Window {
+pub struct Window {
     /// Local extrema in order of time.
-    pub(crate) extrema: Vec<PressureExtremum>,
+    pub extrema: Vec<PressureExtremum>,
     /// |p| at the end of the window, Pa.
-    pub(crate) last: f64,
+    pub last: f64,
 }
 
 impl Window {
@@ -39,7 +41,7 @@ impl Window {
     /// A wave that still rises when the direct wave arrives has no extremum in the window; then
     /// only noise remains, which is small compared to the window's last value, and none of it is
     /// kept.
-    pub(crate) fn drop_noise(&mut self) {
+    pub fn drop_noise(&mut self) {
         let largest = self.extrema.iter().fold(0.0, |max: f64, e| max.max(e.pressure.abs()));
         if largest < FLOOR * self.last {
             self.extrema.clear();
@@ -53,7 +55,7 @@ impl Window {
     }
 
     /// Returns the ratio of |p| of extremum `rank` to its packet's peak; `None` if there are fewer extrema.
-    fn ratio(&self, rank: usize, packet: f64) -> Option<f64> {
+    pub fn ratio(&self, rank: usize, packet: f64) -> Option<f64> {
         let first = self.extrema.get(rank)?;
         let peak = self.extrema[rank..]
             .iter()
@@ -85,7 +87,7 @@ pub(crate) struct Pick {
 
 /// Returns the criterion for the signals of a setup: its threshold is the one for the paper's pulse, and is
 /// lower for a pulse that begins more gently.
-pub(crate) fn criterion(setup: &Setup) -> Picking {
+pub fn criterion(setup: &Setup) -> Picking {
     let threshold = setup.picking.threshold * relative_onset(&setup.probe);
     Picking { threshold, ..setup.picking }
 }
@@ -115,12 +117,7 @@ pub(crate) fn pick(
             ),
         });
     }
-    let FirstRank { rank: first, ratio, skipped } =
-        first_rank(picking.threshold, PACKET_PERIODS / center_frequency, windows)?;
-    let rank = match picking.extremum {
-        settings::Extremum::First => first,
-        settings::Extremum::Second => first + 1,
-    };
+    let ArrayRank { rank, ratio, skipped } = array_rank(picking, center_frequency, windows)?;
     let mut picks = Vec::with_capacity(windows.len());
     for (r, window) in windows.iter().enumerate() {
         picks.push(*window.extrema.get(rank).ok_or_else(|| no_arrival(r, rank))?);
@@ -180,29 +177,47 @@ pub(crate) fn line(
     Ok((slope, largest))
 }
 
-/// The first rank whose ratio exceeds the threshold.
-struct FirstRank {
-    rank: usize,
-    ratio: f64,
-    /// Largest ratio of a lower rank.
-    skipped: f64,
+/// Which extremum is picked at every receiver.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArrayRank {
+    /// Its number in each window, from 0.
+    pub rank: usize,
+    /// Ratio of the packet's first extremum to the packet's peak, in the median over the receivers.
+    pub ratio: f64,
+    /// Largest such ratio of an earlier extremum, which is below the threshold; 0 if there is none.
+    pub skipped: f64,
 }
 
-/// Returns the lowest rank whose ratio, in the median over the receivers, exceeds the threshold.
-fn first_rank(threshold: f64, packet: f64, windows: &[Window]) -> Result<FirstRank, Failure> {
+/// Decides which extremum is picked: the one of lowest rank whose ratio, in the median over the receivers,
+/// exceeds the threshold, or the next.
+///
+/// `picking` is the [`criterion`] of the setup, and `center_frequency` is in Hz.
+///
+/// # Errors
+/// `NoArrival` if a receiver has too few extrema.
+pub fn array_rank(
+    picking: &Picking,
+    center_frequency: f64,
+    windows: &[Window],
+) -> Result<ArrayRank, Failure> {
+    let packet = PACKET_PERIODS / center_frequency;
     // The loop ends at the latest when a receiver has no further extrema.
-    let (mut rank, mut skipped) = (0, 0.0_f64);
+    let (mut first, mut skipped) = (0, 0.0_f64);
     loop {
         let mut ratios = Vec::with_capacity(windows.len());
         for (r, window) in windows.iter().enumerate() {
-            ratios.push(window.ratio(rank, packet).ok_or_else(|| no_arrival(r, rank))?);
+            ratios.push(window.ratio(first, packet).ok_or_else(|| no_arrival(r, first))?);
         }
         let ratio = median(&mut ratios);
-        if ratio > threshold {
-            return Ok(FirstRank { rank, ratio, skipped });
+        if ratio > picking.threshold {
+            let rank = match picking.extremum {
+                settings::Extremum::First => first,
+                settings::Extremum::Second => first + 1,
+            };
+            return Ok(ArrayRank { rank, ratio, skipped });
         }
         skipped = skipped.max(ratio);
-        rank += 1;
+        first += 1;
     }
 }
 
@@ -217,15 +232,18 @@ fn no_arrival(receiver: usize, rank: usize) -> Failure {
     }
 }
 
-/// Returns the median; for an even count the mean of the middle two.
-fn median(values: &mut [f64]) -> f64 {
+/// Returns the median; for an even count the mean of the middle two, of none 0.
+pub fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
     values.sort_unstable_by(f64::total_cmp);
     let middle = values.len() / 2;
     if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
-/// Returns the least-squares slope of distance (m) against time (s), m/s.
-pub(crate) fn slope(distances: &[f64], times: &[f64]) -> f64 {
+/// Returns the least-squares slope of distance (m) against time (s), m/s: the velocity of picked times.
+pub fn slope(distances: &[f64], times: &[f64]) -> f64 {
     let (mean_distance, mean_time) = (mean(distances), mean(times));
     let (mut cross, mut square) = (0.0, 0.0);
     for (x, t) in distances.iter().zip(times) {
@@ -237,7 +255,7 @@ pub(crate) fn slope(distances: &[f64], times: &[f64]) -> f64 {
 }
 
 /// Returns the arithmetic mean.
-pub(crate) fn mean(values: &[f64]) -> f64 {
+pub fn mean(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |sum, value| sum + value) / values.len() as f64
 }
 

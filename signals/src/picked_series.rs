@@ -1,0 +1,112 @@
+//! The picks of all series as CSV and JSON.
+
+use std::path::PathBuf;
+
+use osteon_common::settings::Picking;
+use serde::Serialize;
+
+use crate::array_decision::PickRefusal;
+use crate::direction::{ReceiverPick, VelocityEstimate};
+use crate::pick_failure::PickFailure;
+use crate::series_pick::SeriesPick;
+
+/// The header of the CSV file.
+const COLUMNS: &str = "velocity,standard_error,quality,failure";
+
+/// A series of a file, with its pick.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PickedSeries {
+    /// The file.
+    pub file: PathBuf,
+    /// Positions of the receivers, m.
+    pub positions: Vec<f64>,
+    /// What was found.
+    pub pick: SeriesPick,
+}
+
+impl PickedSeries {
+    fn estimate(&self) -> Option<VelocityEstimate> {
+        self.pick.estimate.as_ref().ok().copied()
+    }
+
+    fn refusal(&self) -> Option<&PickRefusal> {
+        self.pick.estimate.as_ref().err()
+    }
+}
+
+/// Returns the rows of all series as CSV: velocity and standard error in m/s, empty if there is none; quality
+/// from 0 to 1; the name of the failure, empty if there is none.
+pub fn to_csv(series: &[PickedSeries]) -> String {
+    let row = |one: &PickedSeries| match &one.pick.estimate {
+        Ok(VelocityEstimate { velocity, standard_error, quality }) => {
+            format!("{velocity:?},{standard_error:?},{quality:?},\n")
+        }
+        Err(refusal) => format!(",,0.0,{}\n", refusal.failure.name()),
+    };
+    std::iter::once(format!("{COLUMNS}\n")).chain(series.iter().map(row)).collect()
+}
+
+#[derive(Serialize)]
+struct PicksJson<'a> {
+    series: Vec<SeriesJson<'a>>,
+    picking: Option<Picking>,
+}
+
+#[derive(Serialize)]
+struct SeriesJson<'a> {
+    file: String,
+    velocity: Option<f64>,
+    standard_error: Option<f64>,
+    quality: f64,
+    failure: Option<PickFailure>,
+    detail: Option<&'a str>,
+    directions: Option<[f64; 2]>,
+    receivers: Vec<ReceiverJson>,
+}
+
+#[derive(Serialize)]
+struct ReceiverJson {
+    x1: f64,
+    time: Option<f64>,
+    standard_error: Option<f64>,
+    failure: Option<PickFailure>,
+}
+
+/// Returns all series as JSON, with the criterion if it is one for all.
+///
+/// # Errors
+/// If a number is not finite, which none is.
+pub fn to_json(
+    series: &[PickedSeries],
+    picking: Option<Picking>,
+) -> Result<String, serde_json::Error> {
+    let one = |one: &PickedSeries| {
+        let estimate = one.estimate();
+        let receivers = one.positions.iter().zip(&one.pick.receivers);
+        let receivers = receivers.map(|(&x1, receiver)| {
+            let &ReceiverPick { time, standard_error, failure } = receiver;
+            ReceiverJson { x1, time, standard_error: time.map(|_| standard_error), failure }
+        });
+        (estimate, receivers.collect())
+    };
+    let picks = PicksJson {
+        series: series
+            .iter()
+            .map(|picked| {
+                let (estimate, receivers) = one(picked);
+                SeriesJson {
+                    file: picked.file.to_string_lossy().into_owned(),
+                    velocity: estimate.map(|it| it.velocity),
+                    standard_error: estimate.map(|it| it.standard_error),
+                    quality: estimate.map_or(0.0, |it| it.quality),
+                    failure: picked.refusal().map(|it| it.failure),
+                    detail: picked.refusal().map(|it| it.detail.as_str()),
+                    directions: picked.pick.directions,
+                    receivers,
+                }
+            })
+            .collect(),
+        picking,
+    };
+    serde_json::to_string_pretty(&picks).map(|text| text + "\n")
+}

@@ -1,0 +1,13 @@
+//! What is in a file of signals.
+
+use super::array_file::ArrayFile;
+use super::traces_csv::TraceTable;
+
+/// The content of a file, as far as it has been read.
+#[derive(Debug)]
+pub(super) enum SignalContent {
+    /// A table of one series.
+    Table(TraceTable),
+    /// An array of any number of series.
+    Array(ArrayFile),
+}

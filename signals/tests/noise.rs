@@ -1,0 +1,68 @@
+//! Velocities and their standard errors from noisy signals.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
+
+mod support;
+
+use support::{CLEAN, description, packet_peak, pick, with_noise};
+
+/// What many noisy series give.
+#[derive(Debug)]
+struct Account {
+    /// Mean error of the velocity, m/s.
+    bias: f64,
+    /// Mean standard error, m/s.
+    standard_error: f64,
+    /// Share of the intervals of 95 % that contain the exact velocity.
+    coverage: f64,
+    /// Series without a velocity, and velocities off by more than six standard errors.
+    refused: usize,
+    wrong: usize,
+}
+
+fn account(decibels: f64, count: u64) -> Account {
+    let exact = pick(&description(None), &CLEAN).estimate.unwrap().velocity;
+    let deviation = packet_peak(&CLEAN) * libm::pow(10.0, -decibels / 20.0);
+    let probe = description(Some([0.0, 2.5e6]));
+    let (mut found, mut account) =
+        (0.0, Account { bias: 0.0, standard_error: 0.0, coverage: 0.0, refused: 0, wrong: 0 });
+    for seed in 0..count {
+        let Ok(estimate) = pick(&probe, &with_noise(&CLEAN, deviation, seed)).estimate else {
+            account.refused += 1;
+            continue;
+        };
+        let error = estimate.velocity - exact;
+        found += 1.0;
+        account.bias += error;
+        account.standard_error += estimate.standard_error;
+        account.coverage += f64::from(error.abs() <= 1.96 * estimate.standard_error);
+        account.wrong += usize::from(error.abs() > 6.0 * estimate.standard_error);
+    }
+    for mean in [&mut account.bias, &mut account.standard_error, &mut account.coverage] {
+        *mean /= found;
+    }
+    account
+}
+
+fn check(decibels: f64, bias_max: f64, refused_max: usize) {
+    let account = account(decibels, 400);
+    assert!(account.bias.abs() <= bias_max, "{decibels} dB: {account:?}");
+    assert!((0.93..=0.97).contains(&account.coverage), "{decibels} dB: {account:?}");
+    assert!(account.refused <= refused_max && account.wrong == 0, "{decibels} dB: {account:?}");
+}
+
+#[test]
+fn at_40_decibels_intervals_hold() {
+    check(40.0, 1.0, 0);
+}
+
+#[test]
+fn at_30_decibels_the_bias_is_small_and_intervals_hold() {
+    check(30.0, 2.0, 0);
+}
+
+/// The first extremum is a sixth of the packet's peak, here not much more than the noise.
+#[test]
+fn at_20_decibels_intervals_hold() {
+    check(20.0, 8.0, 40);
+}
