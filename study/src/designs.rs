@@ -38,7 +38,7 @@ const TILT: f64 = 8.7e-3;
 
 /// What is measured beside a hundred velocities, and for which quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Plan {
+enum SimulatedPlan {
     AsItIs,
     More,
     Density,
@@ -46,7 +46,13 @@ enum Plan {
     BothDirections,
 }
 
-const PLANS: [Plan; 5] = [Plan::AsItIs, Plan::More, Plan::Density, Plan::A0, Plan::BothDirections];
+const PLANS: [SimulatedPlan; 5] = [
+    SimulatedPlan::AsItIs,
+    SimulatedPlan::More,
+    SimulatedPlan::Density,
+    SimulatedPlan::A0,
+    SimulatedPlan::BothDirections,
+];
 
 /// Returns the standard deviations that a design predicts, and those of as many simulated studies on average.
 ///
@@ -84,7 +90,7 @@ pub fn table(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTable, 
     Ok(table)
 }
 
-impl Plan {
+impl SimulatedPlan {
     fn target(self) -> DesignTarget {
         match self {
             Self::AsItIs | Self::More | Self::BothDirections => DesignTarget::BulkVelocity,
@@ -159,7 +165,7 @@ impl Plan {
 }
 
 /// Returns the key of a plan and the standard deviation that its design predicts.
-fn predicted(twins: &Twins, plan: Plan, of_a0: f64) -> Result<(String, f64), StudyError> {
+fn predicted(twins: &Twins, plan: SimulatedPlan, of_a0: f64) -> Result<(String, f64), StudyError> {
     let job = plan.job(twins.seed);
     let request = DesignRequest {
         specification: &job,
@@ -181,9 +187,13 @@ fn predicted(twins: &Twins, plan: Plan, of_a0: f64) -> Result<(String, f64), Stu
 
 /// Returns the standard deviation that study number `number` of a plan leaves, and the relative error of its mean
 /// velocity of A0. `None` if it has too few velocities or no result.
-fn realized(twins: &Twins, plan: Plan, number: u64) -> Result<Option<(f64, f64)>, StudyError> {
+fn realized(
+    twins: &Twins,
+    plan: SimulatedPlan,
+    number: u64,
+) -> Result<Option<(f64, f64)>, StudyError> {
     let mut job = plan.job(twins.seed + number);
-    job.setup.probe.bidirectional = plan == Plan::BothDirections;
+    job.setup.probe.bidirectional = plan == SimulatedPlan::BothDirections;
     let seed = data_seed(twins.seed, number);
     let bones = bones(&job.setup, plan.velocities(), seed, twins.isa)?;
     if bones.len() < plan.velocities() as usize {
@@ -193,13 +203,13 @@ fn realized(twins: &Twins, plan: Plan, number: u64) -> Result<Option<(f64, f64)>
     let a0: Vec<f64> = bones.iter().filter_map(|bone| bone.1[Observable::A0Velocity]).collect();
     let of_a0 = relative_error(&a0);
     let mut data = Data::from_velocities(velocities.clone());
-    if plan == Plan::A0 {
+    if plan == SimulatedPlan::A0 {
         let mut observables = ObservedColumns::default();
         observables[Observable::A0Velocity] = Some(a0);
         data.measurements = Measurements::Velocities { velocities, subjects: None, observables };
     }
     job.data = Some(data);
-    if let (Plan::Density, Some(posterior)) = (plan, &mut job.posterior) {
+    if let (SimulatedPlan::Density, Some(posterior)) = (plan, &mut job.posterior) {
         let mut generator = Generator::for_index(!twins.seed, number);
         let error = standard_normal_quantile(generator.between(1e-9, 1.0 - 1e-9));
         let spread = DENSITY * OPTIMUM.density();
