@@ -1,7 +1,5 @@
 //! `osteon design`: what to measure next.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should say where")]
-
 #[cfg(test)]
 #[expect(dead_code, reason = "each test file uses a part of it")]
 mod support;
