@@ -11,7 +11,7 @@ pub(crate) struct PickArguments {
     /// `osteon simulate --out` writes them; or arrays of NumPy (.npy, .npz)
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
-    /// Probe file (TOML or JSON): [probe], [layers] and [picking] as in a case file, and [signals] [default: the
+    /// Probe file (TOML or JSON): probe, layers and picking as in a case file, and signals [default: the
     /// receivers of the file's header, and otherwise the defaults of a case file]
     #[arg(long, value_name = "PROBE.toml")]
     pub(crate) describe: Option<PathBuf>,
