@@ -68,7 +68,7 @@ pub(super) struct Responses {
 }
 
 /// Realizations at one point, in index order; those that failed are `None`.
-type Sample = Vec<Option<(f64, ObservableValues)>>;
+type ObservedSample = Vec<Option<(f64, ObservableValues)>>;
 
 impl RespondingModel<'_> {
     /// Computes the responses; `None` if the model has no moments at the point.
@@ -119,7 +119,7 @@ impl RespondingModel<'_> {
         &self,
         uncertain: &Uncertain,
         found: Moments,
-        base: &Sample,
+        base: &ObservedSample,
     ) -> Result<MomentVector, PointError> {
         if uncertain.quantity == SystematicQuantity::VelocityOffset {
             let relative = uncertain.above.value / found.mean;
@@ -142,7 +142,7 @@ impl RespondingModel<'_> {
         Ok(std::array::from_fn(|axis| 0.5 * (above[axis] - below[axis])))
     }
 
-    fn sample(&self, point: &Point) -> Result<Sample, PointError> {
+    fn sample(&self, point: &Point) -> Result<ObservedSample, PointError> {
         let ensemble = self.specification.ensemble(point)?;
         let setup = point.setup(&self.specification.setup);
         let solver = Solver::with_isa(&setup, self.isa);
@@ -165,7 +165,7 @@ impl RespondingModel<'_> {
 }
 
 /// Returns the changes from one sample to another, over the indices that both have.
-fn change(from: &Sample, to: &Sample) -> MomentVector {
+fn change(from: &ObservedSample, to: &ObservedSample) -> MomentVector {
     let pairs =
         || from.iter().zip(to).filter_map(|(from, to)| Some((from.as_ref()?, to.as_ref()?)));
     let of = |side: fn((f64, f64)) -> f64| {
@@ -189,7 +189,7 @@ fn change(from: &Sample, to: &Sample) -> MomentVector {
     changes
 }
 
-fn mean(sample: &Sample, observable: Observable) -> Option<f64> {
+fn mean(sample: &ObservedSample, observable: Observable) -> Option<f64> {
     let values: Vec<f64> = sample.iter().flatten().filter_map(|one| one.1[observable]).collect();
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
