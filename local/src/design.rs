@@ -24,7 +24,7 @@ use osteon_search::prior_deviation;
 use rayon::ThreadPoolBuilder;
 
 use self::responses::Unknown;
-use self::study::{ArrangedPlan, Study};
+use self::study::{ArrangedPlan, DesignStudy};
 
 pub use self::error::DesignError;
 pub use self::measurement::{Accuracy, Measurement, MeasurementPlan, NoMeasurement};
@@ -59,7 +59,7 @@ impl Design {
         let points = 1 + unknowns.iter().map(Unknown::points).sum::<u64>();
         let all = setups * points * REALIZATIONS;
         let done = || progress(all);
-        let study = Study::new(request, specification, unknowns, &pool, &done)?;
+        let study = DesignStudy::new(request, specification, unknowns, &pool, &done)?;
         study.design(plans)
     }
 }

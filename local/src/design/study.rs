@@ -24,7 +24,7 @@ const SMALL: f64 = 1e-4;
 pub(super) type ArrangedPlan = Vec<(Measurement, Option<JobSpecification>)>;
 
 /// The job's model and noise.
-pub(super) struct Study<'a> {
+pub(super) struct DesignStudy<'a> {
     request: &'a DesignRequest<'a>,
     specification: JobSpecification,
     unknowns: Vec<Unknown>,
@@ -36,7 +36,7 @@ pub(super) struct Study<'a> {
     velocities: u64,
 }
 
-impl<'a> Study<'a> {
+impl<'a> DesignStudy<'a> {
     /// Computes the responses of the job's own setup.
     pub(super) fn new(
         request: &'a DesignRequest<'a>,
