@@ -6,7 +6,7 @@ use crate::plausible::TIME_STEP;
 
 fields::choices!(SignalAxis, TimeUnit, Transmitter, SignalUnit);
 
-/// What one axis of an array of signals counts.
+/// An axis of an array of signals: whether its indices number series, sources, receivers or samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SignalAxis {
     /// Measurements, each of which has a velocity.

@@ -23,7 +23,7 @@ const SIZE_LIMIT: SizeLimit =
 /// describe its own traces.
 const PASSED_OVER: [&str; 2] = ["solver", "bone"];
 
-/// What a probe file says.
+/// The content of a probe file: a probe, its layers and its picking, and how its signals are recorded.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProbeDescription {
     /// Probe, layers and criterion.

@@ -42,7 +42,7 @@ fn run(arguments: &PickArguments) -> Ended {
             let picking = description.map(|description| description.setup.picking);
             to_json(&picked, picking).map_err(CommandFailure::failed)?
         }
-        false => shown(&picked, arguments.out.as_deref()),
+        false => text_of_picks(&picked, arguments.out.as_deref()),
     };
     output::stdout(OutputFormat::Text).verbatim(&text).map_err(stdout_failure)?;
     let has_velocity = picked.iter().any(|one| one.pick.estimate.is_ok());
@@ -106,7 +106,7 @@ fn write(path: &Path, text: String) -> Result<(), CommandFailure> {
 }
 
 /// Returns a line for each series, for people.
-fn shown(picked: &[PickedSeries], out: Option<&Path>) -> String {
+fn text_of_picks(picked: &[PickedSeries], out: Option<&Path>) -> String {
     let mut text = "  series  velocity (m/s)  standard error  quality  failure\n".to_owned();
     for (index, one) in picked.iter().enumerate() {
         let number = index + 1;

@@ -103,8 +103,9 @@ impl SimulatedPlan {
         if self == Self::More { 4 * VELOCITIES } else { VELOCITIES }
     }
 
-    /// Returns the plan as a design has it; of A0 the accuracy is that of the simulated studies.
-    fn measured(self, of_a0: f64) -> Vec<MeasurementPlan> {
+    /// Returns the plans that a design is to compare: this one, or none if nothing is added. `of_a0` is the relative
+    /// standard error of the mean velocity of A0 in the simulated studies.
+    fn plans(self, of_a0: f64) -> Vec<MeasurementPlan> {
         let one = match self {
             Self::AsItIs => return Vec::new(),
             Self::More => Measurement::Velocities(self.velocities()),
@@ -172,7 +173,7 @@ fn predicted(twins: &Twins, plan: SimulatedPlan, of_a0: f64) -> Result<(String, 
         set: 0,
         point: OPTIMUM,
         velocities: Some(VELOCITIES),
-        plans: Some(plan.measured(of_a0)),
+        plans: Some(plan.plans(of_a0)),
         isa: twins.isa,
         threads: rayon::current_num_threads(),
     };

@@ -1,4 +1,4 @@
-//! What is known of several unknowns after measurements, to first order.
+//! The covariance of unknown parameters after measurements that depend on them linearly.
 
 /// The covariance of unknowns, each in units of the standard deviation that it has before all measurements.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-//! What may be measured beside, or in place of, what a job has.
+//! Measurements that a design compares, and the texts by which users name them.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ use thiserror::Error;
 /// A measurement that may be added to a study.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Measurement {
-    /// So many velocities in all, with whatever is measured with each.
+    /// The study has this number of velocities in all, and as many values of each observable that its data have.
     Velocities(u64),
     /// The velocities are those of both directions.
     BothDirections,
@@ -58,7 +58,7 @@ pub enum NoMeasurement {
     Number {
         /// Name of the measurement.
         name: String,
-        /// What was given.
+        /// The text after the equals sign.
         text: String,
         /// What is allowed.
         allowed: String,
@@ -156,8 +156,8 @@ impl Measurement {
 }
 
 impl Accuracy {
-    /// Returns the standard error of this value.
-    pub(super) fn of(self, value: f64) -> f64 {
+    /// Returns the standard error of a measurement of this value, in its unit.
+    pub(super) fn standard_error(self, value: f64) -> f64 {
         match self {
             Self::Relative(part) => part * value.abs(),
             Self::Absolute(error) => error,

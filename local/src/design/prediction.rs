@@ -1,4 +1,4 @@
-//! What is asked of a design, and what it tells.
+//! The request for a design, and its result.
 
 use osteon_common::job::JobSpecification;
 use osteon_common::parameters::{Parameter, Point};
@@ -6,7 +6,7 @@ use osteon_solver::Isa;
 
 use super::measurement::MeasurementPlan;
 
-/// What is to be designed.
+/// The job, the point and the plans of a design.
 #[derive(Debug)]
 pub struct DesignRequest<'a> {
     /// The job.
@@ -25,7 +25,7 @@ pub struct DesignRequest<'a> {
     pub threads: usize,
 }
 
-/// What measurements would tell.
+/// For each quantity, the standard deviation that each plan would leave.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Design {
     /// Number of velocities of the job.
@@ -58,7 +58,7 @@ pub struct DesignedQuantity {
     pub ranking: Vec<PredictedDeviation>,
 }
 
-/// What a plan would leave open.
+/// The standard deviation that a plan would leave.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictedDeviation {
     /// What is measured, together with what the job has.

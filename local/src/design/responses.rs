@@ -1,4 +1,4 @@
-//! How the moments of a model's velocities, and the means of its other observables, answer to what is not known.
+//! Derivatives of a model's moments by the parameters and quantities of the setup that are not known.
 
 use osteon_common::job::{JobSpecification, Range};
 use osteon_common::moments::{MOMENTS, MomentVector, Moments};
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// Step of the differences to either side, in edges of the box.
 const STEP: f64 = 5e-3;
 
-/// Something that is not known.
+/// A parameter or a quantity of the setup that is not known exactly.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Unknown {
     /// A parameter that the job searches, with the standard deviation of its prior, in its unit.
@@ -33,7 +33,7 @@ impl Unknown {
         }
     }
 
-    /// Returns how many realizations' worth of points measure its effect.
+    /// Returns the number of points at which the model is evaluated to measure its effect.
     pub(super) fn points(&self) -> u64 {
         match self {
             Self::Searched(..) => 2,

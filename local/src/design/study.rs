@@ -1,4 +1,4 @@
-//! What is known of a job's bones by its data, and what would be with a measurement.
+//! The standard deviations that the data of a job leave, and those that further measurements would leave.
 
 use osteon_common::inference::data_noise;
 use osteon_common::job::JobSpecification;
@@ -172,7 +172,7 @@ impl<'a> DesignStudy<'a> {
             }
             Measurement::Mean(observable, accuracy) => {
                 let mean = self.responses.observables[observable].unwrap_or(f64::NAN);
-                let error = accuracy.of(mean) / mean;
+                let error = accuracy.standard_error(mean) / mean;
                 let derivatives = column(&self.responses, 2 + observable as usize);
                 if !derivatives.iter().chain([&error]).all(|one| one.is_finite()) {
                     let title = observable.row().title;
@@ -205,12 +205,14 @@ impl<'a> DesignStudy<'a> {
         })?;
         let error = match &self.unknowns[place] {
             Unknown::Searched(parameter, deviation) => {
-                accuracy.of(self.request.point.get(*parameter)) / deviation
+                accuracy.standard_error(self.request.point.get(*parameter)) / deviation
             }
             Unknown::OfSetup(uncertain) => {
                 let setup = self.request.point.setup(&self.specification.setup);
                 match (uncertain.quantity.value_in(&setup), accuracy) {
-                    (Some(value), _) => accuracy.of(value) / (uncertain.above.value - value).abs(),
+                    (Some(value), _) => {
+                        accuracy.standard_error(value) / (uncertain.above.value - value).abs()
+                    }
                     // What it may be is one standard deviation, of which a part is left.
                     (None, Accuracy::Relative(part)) => part,
                     (None, Accuracy::Absolute(_)) => {

@@ -62,7 +62,7 @@ fn positions(line: usize, header: &str) -> Result<Vec<f64>, SignalFault> {
         let problem = format!(
             "its first field is {}; the first column is `time`, and a column for each receiver follows, headed \
              by its x1 in m",
-            shown(first)
+            quoted_beginning(first)
         );
         return Err(SignalFault::line(line, problem));
     }
@@ -71,7 +71,7 @@ fn positions(line: usize, header: &str) -> Result<Vec<f64>, SignalFault> {
             let column = index + 2;
             let problem = format!(
                 "column {column} is headed {}; a receiver's column is headed by its x1, a number in m",
-                shown(name)
+                quoted_beginning(name)
             );
             SignalFault::line(line, problem)
         })
@@ -86,8 +86,11 @@ fn positions(line: usize, header: &str) -> Result<Vec<f64>, SignalFault> {
 fn number(line: usize, column: usize, cell: &str) -> Result<f64, SignalFault> {
     let number = cell.trim().parse::<f64>().ok().filter(|number| number.is_finite());
     number.ok_or_else(|| {
-        let problem =
-            format!("column {} is {}; it must be a finite number", column + 1, shown(cell.trim()));
+        let problem = format!(
+            "column {} is {}; it must be a finite number",
+            column + 1,
+            quoted_beginning(cell.trim())
+        );
         SignalFault::line(line, problem)
     })
 }
@@ -120,7 +123,8 @@ fn axis(times: &[(usize, f64)]) -> Result<(f64, f64), SignalFault> {
     }
 }
 
-fn shown(text: &str) -> String {
+/// Returns the beginning of a text in quotation marks, for a message.
+fn quoted_beginning(text: &str) -> String {
     let short: String = text.chars().take(SHOWN_MAX).collect();
     let more = if text.chars().count() > SHOWN_MAX { "…" } else { "" };
     format!("{short:?}{more}")
