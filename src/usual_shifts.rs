@@ -38,14 +38,9 @@ pub(crate) fn usual_shifts(
         Some(arrival.ok()?.velocity)
     };
     let Some(unshifted) = velocity(&setup) else { return Vec::new() };
-    let logarithm = |Shift { quantity, value }: Shift| {
-        let found = velocity(&quantity.with(value, setup.clone()))? / unshifted;
-        // Devices divide the pitch that they know by the times that the true one makes.
-        let pitch = match quantity {
-            SystematicQuantity::Pitch => value / setup.probe.receivers.pitch,
-            _ => 1.0,
-        };
-        Some((found / pitch).ln())
+    let logarithm = |shift: Shift| {
+        let found = velocity(&shift.quantity.with(shift.value, setup.clone()))? / unshifted;
+        Some(found.ln() - shift.pitch_logarithm(&setup))
     };
     let shift = |one: Uncertain| {
         let Uncertain { quantity, below, above } = one;

@@ -90,6 +90,19 @@ impl SystematicQuantity {
     }
 }
 
+impl Shift {
+    /// Returns the logarithm of the shifted pitch relative to that of a setup; 0 of a shift of another quantity.
+    ///
+    /// Devices divide the pitch that they know by the times that the true one makes, so that the logarithm of the
+    /// velocity that they state changes by this less than that of the true one.
+    pub fn pitch_logarithm(self, setup: &Setup) -> f64 {
+        match self.quantity {
+            SystematicQuantity::Pitch => libm::log(self.value / setup.probe.receivers.pitch),
+            _ => 0.0,
+        }
+    }
+}
+
 impl SystematicLaw {
     /// Returns the values one standard deviation below and above the job's; `None` of a quantity that is
     /// known exactly.

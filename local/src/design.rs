@@ -59,7 +59,11 @@ impl Design {
         let points = 1 + unknowns.iter().map(Unknown::points).sum::<u64>();
         let all = setups * points * REALIZATIONS;
         let done = || progress(all);
-        let study = DesignStudy::new(request, specification, unknowns, &pool, &done)?;
+        let is_mean = |one: &Measurement| matches!(one, Measurement::Mean(..));
+        let observed = !request.specification.observables().is_empty()
+            || plans.iter().flatten().any(|(one, _)| is_mean(one));
+        let by = (&pool, &done as &(dyn Fn() + Sync));
+        let study = DesignStudy::new(request, specification, unknowns, observed, by)?;
         study.design(plans)
     }
 }

@@ -62,10 +62,7 @@ fn half_difference(
     let found = |shift: Shift| {
         let is_row = |row: &&Evaluation| row.belongs_to(set) && row.point.shift() == Some(shift);
         let mut found = changes(specification, set, best, history.iter().find(is_row)?)?;
-        if shift.quantity == SystematicQuantity::Pitch {
-            // Devices divide the pitch that they know by the times that the true one makes.
-            found[0] -= libm::log(shift.value / setup.probe.receivers.pitch);
-        }
+        found[0] -= shift.pitch_logarithm(&setup);
         Some(found)
     };
     match (uncertain.below.and_then(found), found(uncertain.above)) {

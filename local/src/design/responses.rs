@@ -129,11 +129,7 @@ impl RespondingModel<'_> {
         }
         let shifted = |shift: Shift| {
             let mut changes = change(base, &self.sample(&self.point.shifted(Some(shift)))?);
-            if shift.quantity == SystematicQuantity::Pitch {
-                // Devices divide the pitch that they know by the times that the true one makes.
-                let known = self.specification.setup.probe.receivers.pitch;
-                changes[0] -= libm::log(shift.value / known);
-            }
+            changes[0] -= shift.pitch_logarithm(&self.specification.setup);
             Ok::<_, PointError>(changes)
         };
         let above = shifted(uncertain.above)?;

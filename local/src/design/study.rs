@@ -37,18 +37,18 @@ pub(super) struct DesignStudy<'a> {
 }
 
 impl<'a> DesignStudy<'a> {
-    /// Computes the responses of the job's own setup.
+    /// Computes the responses of the job's own setup, with those of its observables if `observed`.
     pub(super) fn new(
         request: &'a DesignRequest<'a>,
         specification: JobSpecification,
         unknowns: Vec<Unknown>,
-        pool: &'a ThreadPool,
-        done: &'a (dyn Fn() + Sync),
+        observed: bool,
+        (pool, done): (&'a ThreadPool, &'a (dyn Fn() + Sync)),
     ) -> Result<Self, DesignError> {
         let model = RespondingModel {
             specification: &specification,
             point: request.point,
-            observed: true,
+            observed,
             isa: request.isa,
             pool,
             done,
