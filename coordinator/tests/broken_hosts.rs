@@ -123,6 +123,23 @@ fn broken_hosts_are_outvoted_as_long_as_they_are_the_minority() {
     }
 }
 
+/// Machines that break within the last answer of their stay: what they answered before was right, and they are
+/// started again before they answer anything else.
+#[test]
+fn a_host_that_breaks_within_the_last_answer_of_a_stay_is_in_no_result() {
+    let mut outcomes = Outcome::default();
+    for right in (20..100).step_by(2) {
+        let stay = Some(Duration::from_millis(100));
+        let fault = Some(Fault::After(right));
+        let machines = Machines { hosts: 1, processes: 2, fault, restart: stay };
+        let outcome = run(3, 5, &[machines]);
+        assert!(outcome.banned.iter().all(|host| host == "1-"), "{machines:?}: {outcome:?}");
+        outcomes.wrong += outcome.wrong;
+        outcomes.wrong_at_last += outcome.wrong_at_last;
+    }
+    assert_eq!((outcomes.wrong, outcomes.wrong_at_last), (0, 0));
+}
+
 /// What proofs and audits cost where nothing is wrong.
 #[test]
 fn checks_cost_a_hundredth() {

@@ -95,13 +95,6 @@ fn interval(fraction: f64, audited: u64, u: f64) -> f64 {
     if fraction >= 1.0 { 0.0 } else { 2.0 * u * audited as f64 / fraction }
 }
 
-/// Returns one index of `answered`, drawn by the key.
-pub(crate) fn choose_one(key: &AuditKey, attempt: u64, answered: Indices) -> Indices {
-    let offset = (uniform(key, [attempt, answered.first, 3]) * answered.count as f64) as u64;
-    let first = answered.first + offset.min(answered.count.saturating_sub(1));
-    Indices { first, count: 1 }
-}
-
 /// Returns a uniform number in [0, 1): a function of the key and of these numbers, of which the last tells draws of
 /// different purposes apart.
 fn uniform(key: &AuditKey, of: [u64; 3]) -> f64 {

@@ -70,7 +70,7 @@ pub struct PendingEvaluation {
     pub(crate) workers: Vec<WorkerName>,
     /// The last answer of each of these, as far as it is among the results.
     pub(crate) last_answers: Vec<Indices>,
-    /// Places in `workers` of those whose last answers are audited, or need no audit.
+    /// Places in `workers` of those whose last realizations are audited.
     pub(crate) vouched: BTreeSet<usize>,
     /// All results are there, and their workers are proven, or nobody can check them.
     pub(crate) is_cleared: bool,
@@ -231,17 +231,14 @@ impl PendingEvaluation {
         // There are never so many workers that their positions do not fit into 32 bits.
         let owner = u32::try_from(place).unwrap_or(u32::MAX - 1);
         self.results.fill(first, solved, owner);
-        let own = self.results.owner(first) == Some(owner);
-        if let Some(last) = self.last_answers.get_mut(place).filter(|_| own) {
-            *last = Indices {
-                first: indices.first,
-                count: self.results.of_same_owner(first, most) as u64,
-            };
+        let own = self.results.last_run_of(owner, first..first + solved.len());
+        if let Some((last, run)) = self.last_answers.get_mut(place).zip(own) {
+            *last = run;
             self.vouched.remove(&place);
         }
     }
 
-    /// Notes that the last answer of a worker needs no further audit.
+    /// Notes that the last realization of a worker needs no further audit.
     pub(crate) fn vouch(&mut self, by: &WorkerName) {
         self.vouched.extend(self.workers.iter().position(|worker| worker == by));
     }

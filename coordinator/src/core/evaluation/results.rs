@@ -143,6 +143,15 @@ impl Results {
         owners.iter().take(most).take_while(|of| *of == owner).count()
     }
 
+    /// Returns the last consecutive indices of `range` whose results a worker gave; `None` if it gave none.
+    pub(crate) fn last_run_of(&self, owner: u32, range: Range<usize>) -> Option<Indices> {
+        let owners = self.owners.get(range.clone())?;
+        let end = owners.iter().rposition(|of| *of == owner)? + 1;
+        let before = owners[..end].iter().rposition(|of| *of != owner);
+        let begin = before.map_or(0, |place| place + 1);
+        Some(Indices { first: (range.start + begin) as u64, count: (end - begin) as u64 })
+    }
+
     /// Returns the numbers of the pieces that have all their results.
     pub(crate) fn full_pieces(&self) -> impl Iterator<Item = usize> {
         let counts = self.filled_of_piece.iter().enumerate();
@@ -218,6 +227,10 @@ mod tests {
             [0, 1, 3, 4, 5].map(|index| results.owner(index)),
             [None, Some(1), Some(0), Some(1), None]
         );
+        let last_run = |owner, range| results.last_run_of(owner, range);
+        assert_eq!(last_run(1, 1..5), Some(Indices { first: 4, count: 1 }));
+        assert_eq!(last_run(1, 0..3), Some(Indices { first: 1, count: 2 }));
+        assert_eq!((last_run(0, 0..3), last_run(1, 3..6)), (None, None));
         let same = |first| results.of_same_owner(first, 9);
         assert_eq!([0, 1, 2, 3, 4, 5].map(same), [0, 2, 1, 1, 1, 0]);
         assert_eq!(results.of_same_owner(1, 1), 1);

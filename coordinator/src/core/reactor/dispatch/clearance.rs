@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use super::{overdue, proofs};
-use crate::core::audit;
 use crate::core::evaluation::{Audit, PendingEvaluation};
 use crate::core::ids::{BatchId, JobId, WorkerId};
+use crate::core::indices::Indices;
 use crate::core::proofs::SetupKey;
 use crate::core::reactor::turn::Turn;
 use crate::core::state::State;
@@ -91,7 +91,7 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
         return;
     };
     for place in audited {
-        audit_last(evaluation, place, None);
+        audit_last(evaluation, place, u64::MAX);
     }
     if is_cleared {
         evaluation.is_cleared = true;
@@ -99,28 +99,33 @@ pub(crate) fn clear(turn: &mut Turn, id: JobId, attempt: u64) {
     }
 }
 
-/// Queues an audit of one realization of the last answer of each worker, so that a machine that has broken
-/// meanwhile is found before the evaluation counts. With so many workers that these would be more than the
-/// fraction of the realizations that is audited, none is queued, and the machine is found by its next audit.
+/// Queues an audit of the last realization of each worker, so that a machine that has broken meanwhile is found
+/// before the evaluation counts, even if it broke within its last answer. Of attached workers none is queued if
+/// there are so many that these would be more than the fraction of the realizations that is audited: such a machine
+/// is found by its next audit, which never comes for a worker that has left.
 fn audit_last_answers(turn: &mut Turn, id: JobId, attempt: u64) {
-    let (key, fraction) = (turn.state.config.audit_key, turn.state.config.audit_fraction);
+    let fraction = turn.state.config.audit_fraction;
     let state = &*turn.state;
     let Some(evaluation) = state.jobs.get(&id).and_then(|job| job.certain_evaluation(attempt))
     else {
         return;
     };
-    if evaluation.workers.len() as f64 > fraction * evaluation.realizations() as f64 {
+    if fraction <= 0.0 {
         return;
     }
-    let workers = evaluation.workers.iter().enumerate();
-    let due = workers.filter(|(place, name)| {
-        !evaluation.vouched.contains(place) && state.can_check(name.host())
-    });
+    let are_few = evaluation.workers.len() as f64 <= fraction * evaluation.realizations() as f64;
+    let attached: BTreeSet<&WorkerName> = state.workers.values().map(|one| &one.name).collect();
+    let is_due = |(place, name): &(usize, &WorkerName)| {
+        !evaluation.vouched.contains(place)
+            && (are_few || !attached.contains(name))
+            && state.can_check(name.host())
+    };
+    let due = evaluation.workers.iter().enumerate().filter(is_due);
     let due: Vec<(usize, WorkerName)> = due.map(|(place, name)| (place, name.clone())).collect();
     for (place, name) in due {
         let job = turn.state.jobs.get_mut(&id);
         if let Some(evaluation) = job.and_then(|job| job.certain_evaluation_mut(attempt)) {
-            audit_last(evaluation, place, Some(&key));
+            audit_last(evaluation, place, 1);
             turn.state.count_checked(&name, 1);
         }
     }
@@ -154,9 +159,9 @@ fn clearance_need(
     }
 }
 
-/// Queues an audit of the last answer of a worker, unless it has been audited; with a key, of one
-/// realization of it.
-fn audit_last(evaluation: &mut PendingEvaluation, place: usize, one: Option<&audit::AuditKey>) {
+/// Queues an audit of the last realizations of a worker, at most `most` and of one answer, unless they have been
+/// audited.
+fn audit_last(evaluation: &mut PendingEvaluation, place: usize, most: u64) {
     if !evaluation.vouched.insert(place) {
         return;
     }
@@ -165,7 +170,8 @@ fn audit_last(evaluation: &mut PendingEvaluation, place: usize, one: Option<&aud
     else {
         return;
     };
-    let indices = one.map_or(*last, |key| audit::choose_one(key, evaluation.attempt, *last));
+    let count = last.count.min(most);
+    let indices = Indices { first: last.end() - count, count };
     evaluation.audits.push_back(Audit { indices, by: by.clone(), lost: 0 });
 }
 

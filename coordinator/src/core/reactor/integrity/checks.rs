@@ -47,7 +47,9 @@ pub(crate) fn audit(state: &mut State, worker: WorkerId, batch: BatchId, assignm
     if let Some(indices) = chosen
         && let Some(evaluation) = state.evaluation_of_mut(assignment)
     {
-        evaluation.vouch(&by);
+        if indices.end() == assignment.indices.end() {
+            evaluation.vouch(&by);
+        }
         evaluation.audits.push_back(Audit { indices, by, lost: 0 });
     }
 }
