@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// Files and directories of the program's source. A change in any of them runs this script again, so
 /// that it notices a modified tree.
-const SOURCES: [&str; 34] = [
+const SOURCES: [&str; 38] = [
     ".cargo",
     "Cargo.lock",
     "Cargo.toml",
@@ -33,11 +33,15 @@ const SOURCES: [&str; 34] = [
     "rust-toolchain.toml",
     "search/Cargo.toml",
     "search/src",
+    "signals/Cargo.toml",
+    "signals/src",
     "slurm/Cargo.toml",
     "slurm/src",
     "solver/Cargo.toml",
     "solver/src",
     "src",
+    "transport/Cargo.toml",
+    "transport/src",
     "umbridge/Cargo.toml",
     "umbridge/src",
     "worker/Cargo.toml",

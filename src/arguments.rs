@@ -35,7 +35,9 @@ pub(crate) use operators::{
     WorkerCommand, WorkerListArguments,
 };
 pub(crate) use pick::PickArguments;
-pub(crate) use realizations::{DesignArguments, DrawArguments, ObserveArguments, PlaceArguments};
+pub(crate) use realizations::{
+    DesignArguments, DrawArguments, ObserveArguments, PlaceArguments, SynthesizeArguments,
+};
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use tools::{
     CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments, SchemaArguments,
@@ -72,6 +74,8 @@ pub(crate) enum Command {
     Draw(DrawArguments),
     /// Compute all observables of a job's realizations: velocities, decay, frequency
     Observe(ObserveArguments),
+    /// Record what a probe would measure of bones drawn by a job's law: signals of a known truth
+    Synthesize(SynthesizeArguments),
     /// Predict which further measurement would narrow most what is known
     Design(DesignArguments),
     /// Commands of wings.

@@ -17,6 +17,7 @@ mod pick;
 mod run;
 mod schema;
 mod simulate;
+mod synthesize;
 mod token;
 mod worker;
 
@@ -60,6 +61,10 @@ fn prepare_command(
         Command::Observe(arguments) => {
             let observed = observe::observe(arguments, isa()?, context.cores);
             PreparedCommand::interruptible("no file was written", observed)
+        }
+        Command::Synthesize(arguments) => {
+            let written = synthesize::synthesize(arguments, isa()?, context.cores);
+            PreparedCommand::interruptible("no file was written", written)
         }
         Command::Design(arguments) => {
             PreparedCommand::harmless(design::design(arguments, isa()?, context.cores))

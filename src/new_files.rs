@@ -1,4 +1,4 @@
-//! Creation of files that are never overwritten: certificates, keys, tokens.
+//! Creation of files that are never overwritten.
 
 use std::fs::{self, OpenOptions};
 use std::io::Write as _;
@@ -17,7 +17,7 @@ pub(crate) struct NewFile {
     /// Path of the file.
     pub(crate) path: PathBuf,
     /// Content of the file; overwritten in memory when it is dropped.
-    pub(crate) text: Zeroizing<String>,
+    pub(crate) content: Zeroizing<Vec<u8>>,
     /// Whether only its owner may read it.
     pub(crate) secret: bool,
 }
@@ -106,7 +106,7 @@ fn write(file: &NewFile) -> std::io::Result<()> {
     let mode = if file.secret { 0o600 } else { 0o644 };
     let mut options = OpenOptions::new();
     let mut opened = options.write(true).create_new(true).mode(mode).open(&file.path)?;
-    let written = opened.write_all(file.text.as_bytes()).and_then(|()| opened.sync_all());
+    let written = opened.write_all(&file.content).and_then(|()| opened.sync_all());
     if written.is_err() {
         // An incomplete file is useless.
         drop(fs::remove_file(&file.path));

@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::settings::Picking;
+
 /// File and lines of a job's velocities.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Origin {
     /// The file.
     pub path: PathBuf,
@@ -16,6 +18,10 @@ pub struct Origin {
     pub left_out: u32,
     /// Rows that are no measurements, such as their mean, and were left out: as in `line 70 "Mean"`.
     pub no_rows: Vec<String>,
+    /// Name of the column of standard errors, if they are the data's repeatability.
+    pub error_column: Option<String>,
+    /// The criterion by which the velocities were picked, if the file says so.
+    pub picking: Option<Picking>,
 }
 
 impl Origin {

@@ -12,6 +12,7 @@ use crate::origin::Origin;
 use crate::parameters::Parameter;
 use crate::quantile::quantile;
 use crate::robust::outliers;
+use crate::settings::Picking;
 use crate::setup_quantity::SetupQuantity;
 
 use crate::plausible::{self, PlausibleRange, short};
@@ -85,6 +86,9 @@ pub fn job_warnings_from(
     if let Some(data) = &specification.data {
         warnings.known(data);
         warnings.data(data, origin);
+    }
+    if let Some(picked) = origin.and_then(|origin| origin.picking) {
+        warnings.picking(&specification.setup.picking, &picked);
     }
     warnings.0
 }
@@ -173,6 +177,24 @@ impl Warnings {
                 self.add(&format!("data.known.{}", parameter.name()), doubt);
             }
         }
+    }
+
+    /// Warns if the model's signals and the measured ones are picked by different criteria.
+    fn picking(&mut self, of_model: &Picking, of_data: &Picking) {
+        if of_model == of_data {
+            return;
+        }
+        let stated = |one: &Picking| {
+            format!("extremum = \"{}\", threshold = {:?}", one.extremum.name(), one.threshold)
+        };
+        let (model, data) = (stated(of_model), stated(of_data));
+        self.add(
+            "picking",
+            format!(
+                "has {model}, and the file of velocities says that they were picked with {data}; velocities by \
+                 different criteria differ by tens of m/s: write the latter into [picking]"
+            ),
+        );
     }
 
     fn data(&mut self, data: &Data, origin: Option<&Origin>) {
@@ -403,8 +425,7 @@ mod tests {
             path: "v.csv".into(),
             lines: vec![(2..22).collect()],
             unused_subjects: Some("patient".to_owned()),
-            left_out: 0,
-            no_rows: Vec::new(),
+            ..Origin::default()
         };
         let mut warnings = Warnings::default();
         warnings.data(&Data::from_velocities(velocities), Some(&origin));
@@ -431,13 +452,8 @@ mod tests {
         };
         assert_eq!(warnings(&velocities, None), [""; 0]);
         velocities[17] = 7800.0;
-        let origin = Origin {
-            path: "v.csv".into(),
-            lines: vec![(2..42).collect()],
-            unused_subjects: None,
-            left_out: 0,
-            no_rows: Vec::new(),
-        };
+        let origin =
+            Origin { path: "v.csv".into(), lines: vec![(2..42).collect()], ..Origin::default() };
         assert_eq!(
             warnings(&velocities, Some(&origin)),
             [

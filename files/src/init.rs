@@ -56,5 +56,7 @@ pub fn of_csv(path: &Path, name: &str) -> Result<FirstJob, InitError> {
     let measured = velocities::read_as_understood(path, table, &roles.named()).map_err(refused)?;
     understood.extend(measured.account.described(&missing));
     understood.extend(roles.described());
-    Ok(FirstJob { text: template::of_data(&data), understood })
+    let picking = measured.origin.picking.as_ref().map(template::picking_section);
+    let text = template::of_data(&data) + &picking.unwrap_or_default();
+    Ok(FirstJob { text, understood })
 }

@@ -19,6 +19,7 @@ pub mod init;
 pub mod input_file;
 pub mod job_file;
 pub mod materials;
+pub mod picking_comment;
 pub mod posterior_csv;
 pub mod probe_file;
 mod pulse;

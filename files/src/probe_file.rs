@@ -5,7 +5,7 @@ use std::path::Path;
 use osteon_common::case::Setup;
 use osteon_common::check;
 use osteon_common::field_path::{element_path, quoted};
-use osteon_common::fields::Choice;
+use osteon_common::fields::{Choice, Key};
 use osteon_common::limits;
 use osteon_common::signal_layout::{SignalAxis, SignalLayout, Transmitter};
 
@@ -16,6 +16,10 @@ use crate::input_file::InputFile;
 use crate::job_file;
 use crate::reader::{self, Reader, Table};
 
+pub use crate::toml_text::probe as to_toml;
+
+/// The section of how signals are recorded.
+pub(crate) const SIGNALS: Key = Key { name: "signals", meaning: "how the signals are recorded" };
 /// Limit of a probe file's length, as of a case file's.
 const SIZE_LIMIT: SizeLimit =
     SizeLimit { bytes: limits::CASE_FILE_BYTES_MAX, suffices_for: "any probe file needs" };
@@ -57,7 +61,7 @@ fn of_document(
     let root = document.tree()?;
     let mut reader = Reader::default();
     let [solver, bone] = PASSED_OVER;
-    let table = reader.root(&root, &["layers", "probe", "picking", "signals", solver, bone]);
+    let table = reader.root(&root, &["layers", "probe", "picking", SIGNALS.name, solver, bone]);
     let refused = |reader: &Reader| -> Result<_, ContentError> {
         let refused: Invalid = reader.refuse(document, &root);
         Err(refused.into())
@@ -68,7 +72,7 @@ fn of_document(
     // The solver's settings are read with the others, and mean nothing here.
     let setup = job_file::setup(&mut reader, &table, directory);
     let mut signals = SignalLayout::default();
-    let section = reader::section(&mut reader, &table, "signals", &mut signals);
+    let section = reader::section(&mut reader, &table, SIGNALS.name, &mut signals);
     let given = names(&mut reader, &section, SignalLayout::AXES.name, SignalAxis::Time);
     signals.axes = given.unwrap_or(signals.axes);
     let given = names(&mut reader, &section, SignalLayout::TRANSMITTERS.name, Transmitter::First);
@@ -135,6 +139,17 @@ mod tests {
              transmitters = [\"second\", \"first\"]\n[bone]\ndensity = 1.0\n",
             "5 receivers, [Receiver, Time], [0.0, 3000000.0], [Second, First]",
         );
+    }
+
+    #[test]
+    fn a_written_description_is_read_back() {
+        let text = "[probe.receivers]\ncount = 5\n[signals]\naxes = [\"series\", \"receiver\", \"time\"]\n\
+                    band = [0, 3e6]\nsampling_interval = 3e-8\nunit = \"counts\"\nfull_scale = 100.0\n\
+                    transmitters = [\"second\", \"first\"]\n[picking]\nextremum = \"second\"\n";
+        let description = parse(text, Format::Toml).unwrap();
+        assert_eq!(parse(&to_toml(&description), Format::Toml).unwrap(), description);
+        let usual = ProbeDescription::default();
+        assert_eq!(parse(&to_toml(&usual), Format::Toml).unwrap(), usual);
     }
 
     #[test]

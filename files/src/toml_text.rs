@@ -17,6 +17,9 @@ use osteon_common::parameters::Parameter;
 use osteon_common::porosity::{POROSITY, PorosityModel};
 use osteon_common::pulse::PulseForm;
 use osteon_common::setup_quantity::SetupQuantity;
+use osteon_common::signal_layout::SignalLayout;
+
+use crate::probe_file::{ProbeDescription, SIGNALS};
 
 /// Number of velocities per line of an inlined data set.
 const NUMBERS_PER_LINE: usize = 6;
@@ -60,6 +63,25 @@ pub fn job(specification: &JobSpecification) -> String {
             range(out, parameter, specification.range(parameter))?;
         }
         run(out, specification)
+    })
+}
+
+/// Returns the complete probe file of a description.
+///
+/// Reading it gives the description back to the bit, if it passes its checks.
+pub fn probe(description: &ProbeDescription) -> String {
+    written(|out| {
+        setup(out, &description.setup, &[])?;
+        let SignalLayout { axes, transmitters, .. } = &description.signals;
+        writeln!(out)?;
+        section(out, SIGNALS, &mut description.signals.clone())?;
+        let names = |names: Vec<&str>| format!("{names:?}");
+        if !axes.is_empty() {
+            let axes = axes.iter().map(|axis| axis.name()).collect();
+            writeln!(out, "{} = {}", SignalLayout::AXES.name, names(axes))?;
+        }
+        let transmitters = transmitters.iter().map(|one| one.name()).collect();
+        writeln!(out, "{} = {}", SignalLayout::TRANSMITTERS.name, names(transmitters))
     })
 }
 

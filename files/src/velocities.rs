@@ -52,6 +52,7 @@ use self::column_choice::POSSIBLE;
 use self::columns::Columns;
 use self::lines::{TableLine, TableLines};
 use self::problem::{LocatedProblem, Problem, shortened};
+use crate::picking_comment;
 
 pub(crate) use self::collected::Measured;
 pub(crate) use self::column_roles::{is_like_group, is_like_subject};
@@ -165,7 +166,8 @@ fn of_table(
         Columns::of_table(table, named).map_err(|problem| vec![located((header, problem))])?;
     let gathered = gather(table, &columns, named)
         .map_err(|problems| problems.into_iter().map(located).collect::<Vec<_>>())?;
-    let measured = gathered.finish(path, &columns);
+    let mut measured = gathered.finish(path, &columns);
+    measured.origin.picking = picking_comment::read(&table.content.text);
     if let Some(column) = named.group.first()
         && measured.data.iter().all(|group| group.no_variation().is_some())
     {

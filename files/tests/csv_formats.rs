@@ -51,6 +51,50 @@ fn files_as_people_have_them_are_read() {
     }
 }
 
+/// What `osteon pick` writes: the root mean square of the standard errors is the repeatability, and rows without a
+/// velocity are left out.
+#[test]
+fn standard_errors_are_the_repeatability() {
+    let picked = b"# picking.extremum = \"first\"\n# picking.threshold = 0.05\n\
+        velocity,standard_error,quality,failure\n3900.5,3.0,0.9,\n,,0.0,too_noisy\n4000.0,4.0,0.8,\n";
+    let keys = "error_column = \"standard_error\"\nmissing = [\"\"]";
+    let expected =
+        Data { repeatability: 12.5_f64.sqrt(), ..Data::from_velocities(vec![3900.5, 4000.0]) };
+    assert_eq!(read_as(picked, keys), Ok(Some(expected)));
+    // They are in the unit of the velocities.
+    let in_km = b"v,e\n3.9005,0.003\n4,0.004\n";
+    let data = read_as(in_km, "column = \"v\"\nunit = \"km/s\"\nerror_column = \"e\"");
+    assert!((data.unwrap().unwrap().repeatability / 12.5_f64.sqrt() - 1.0).abs() < 1e-15);
+    for (text, more, expected) in [
+        ("velocity,e\n3900,-1\n4000,1\n", "", "e is \"-1\"; it must be the standard error"),
+        ("velocity,e\n3900,\n4000,1\n", "", "e is \"\"; it must be the standard error"),
+        (
+            "velocity,e\n3900,60\n4000,90\n",
+            "",
+            "data.error_column: has errors whose root mean square is 76.4",
+        ),
+        ("velocity,e\n3900,1\n4000,1\n", "repeatability = 1.0", "leave one of them out"),
+        ("velocity\n3900\n4000\n", "", "no column `e`"),
+    ] {
+        let found = read_as(text.as_bytes(), &format!("error_column = \"e\"\n{more}"));
+        let refused = found.unwrap_err();
+        assert!(refused.contains(expected), "{text} {more}: {refused}");
+    }
+}
+
+/// A model whose signals are picked otherwise than the measured ones is warned of.
+#[test]
+fn another_criterion_of_picking_is_told() {
+    let picked =
+        "# picking.extremum = \"first\"\n# picking.threshold = 0.05\nvelocity\n3900\n4000\n";
+    let found = warnings(picked, "");
+    let expected =
+        "picking: has extremum = \"second\", threshold = 0.06, and the file of velocities says";
+    assert!(found.iter().any(|one| one.contains(expected)), "{found:?}");
+    let same = picked.replace("first", "second").replace("0.05", "0.06");
+    assert!(warnings(&same, "").iter().all(|one| !one.contains("picking")));
+}
+
 #[test]
 fn several_columns_name_a_group_together() {
     let text = "patient,site,velocity\nA,left,3900\nB,left,3910\nA,right,3920\nA,left,3930\n";

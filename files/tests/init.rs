@@ -45,6 +45,25 @@ fn understood(bytes: &[u8]) -> Result<(Vec<String>, Vec<String>), String> {
     Ok((lines.take_while(|line| !line.is_empty()).map(str::to_owned).collect(), first.understood))
 }
 
+/// A file of `osteon pick`: standard errors are named, what was not picked is left out, and the criterion becomes
+/// that of the job.
+#[test]
+fn picked_velocities_are_understood() {
+    let mut picked = b"# picking.extremum = \"second\"\n# picking.threshold = 0.05\n".to_vec();
+    picked.extend(file("velocity,standard_error,quality,failure", "\n", |i, v| match i {
+        3 => format!(",,0.0,too_noisy\n{v},3.5,0.9,"),
+        _ => format!("{v},2.5,0.9,"),
+    }));
+    let (lines, sentences) = understood(&picked).unwrap();
+    assert_eq!(lines, ["missing = [\"\"]", "error_column = \"standard_error\""]);
+    assert!(sentences.join("\n").contains("standard errors in the column"), "{sentences:?}");
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("v.csv");
+    std::fs::write(&path, picked).unwrap();
+    let job = init::of_csv(&path, "v.csv").unwrap().text;
+    assert!(job.contains("[picking]\nextremum = \"second\"\nthreshold = 0.05\n"), "{job}");
+}
+
 #[test]
 fn files_as_people_have_them_are_understood() {
     let check = |bytes: &[u8], keys: &[&str], said: &str| {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use osteon_common::settings::Picking;
+use osteon_files::picking_comment;
 use serde::Serialize;
 
 use crate::array_decision::PickRefusal;
@@ -35,15 +36,16 @@ impl PickedSeries {
 }
 
 /// Returns the rows of all series as CSV: velocity and standard error in m/s, empty if there is none; quality
-/// from 0 to 1; the name of the failure, empty if there is none.
-pub fn to_csv(series: &[PickedSeries]) -> String {
+/// from 0 to 1; the name of the failure, empty if there is none. Comments above them state the criterion.
+pub fn to_csv(series: &[PickedSeries], picking: &Picking) -> String {
     let row = |one: &PickedSeries| match &one.pick.estimate {
         Ok(VelocityEstimate { velocity, standard_error, quality }) => {
             format!("{velocity:?},{standard_error:?},{quality:?},\n")
         }
         Err(refusal) => format!(",,0.0,{}\n", refusal.failure.name()),
     };
-    std::iter::once(format!("{COLUMNS}\n")).chain(series.iter().map(row)).collect()
+    let head = picking_comment::of_picking(picking) + COLUMNS + "\n";
+    std::iter::once(head).chain(series.iter().map(row)).collect()
 }
 
 #[derive(Serialize)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use osteon_local::design::MeasurementPlan;
 
-use super::JobFileArguments;
+use super::{JobFileArguments, positive};
 
 /// Arguments of `draw`.
 #[derive(Debug, Args)]
@@ -52,6 +52,44 @@ pub(crate) struct ObserveArguments {
     pub(crate) json: bool,
 }
 
+/// Arguments of `synthesize`.
+#[derive(Debug, Args)]
+pub(crate) struct SynthesizeArguments {
+    /// The job.
+    #[command(flatten)]
+    pub(crate) job: JobFileArguments,
+    /// Number of measurements, each of a bone of its own, drawn by the job's law and seed (and none of the job's
+    /// own realizations)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) series: u64,
+    /// Level of the noise below the peak of the first packet, which is that of the mean bone, in the mean over
+    /// the receivers (dB) [default: no noise]
+    #[arg(long, value_name = "D", value_parser = level)]
+    pub(crate) noise_db: Option<f64>,
+    /// Standard deviation of the receivers' gains (dB). A receiver has the same gain in all measurements
+    #[arg(long, value_name = "G", default_value = "0", value_parser = level)]
+    pub(crate) gain_db: f64,
+    /// Probability that a receiver records nothing in a measurement
+    #[arg(long, value_name = "F", default_value = "0", value_parser = probability)]
+    pub(crate) dropouts: f64,
+    /// Largest pressure that is recorded, in peaks of the first packet [default: larger than any]
+    #[arg(long, value_name = "R", value_parser = ratio)]
+    pub(crate) full_scale: Option<f64>,
+    /// Time between samples (seconds) [default: a fiftieth of the period of the centre frequency]
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub(crate) time_step: Option<f64>,
+    /// The point.
+    #[command(flatten)]
+    pub(crate) place: PlaceArguments,
+    /// Number of threads to compute on [default: all cores]
+    #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) threads: Option<u32>,
+    /// Directory for the signals (signals.npy), their description (probe.toml) and the model's velocities
+    /// (truth.csv)
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
 /// Arguments of `design`.
 #[derive(Debug, Args)]
 pub(crate) struct DesignArguments {
@@ -82,4 +120,25 @@ pub(crate) struct DesignArguments {
     /// Print the design as JSON
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+fn level(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (0.0..=200.0).contains(&number) => Ok(number),
+        _ => Err("it must be a number from 0 to 200 (dB)".to_owned()),
+    }
+}
+
+fn probability(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (0.0..=0.5).contains(&number) => Ok(number),
+        _ => Err("it must be a number from 0 to 0.5".to_owned()),
+    }
+}
+
+fn ratio(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number <= 1e6 => Ok(number),
+        _ => Err("it must be a number above 0 and at most 1e6".to_owned()),
+    }
 }

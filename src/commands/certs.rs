@@ -63,14 +63,15 @@ fn existing(ca: &Path, directory: &Path) -> Result<(Authority, Vec<NewFile>), Co
     let authority = Authority::from_pem(&text, &secret)
         .with_context(|| format!("{} is not an authority that can sign", certificate.display()))
         .map_err(CommandFailure::BadInput)?;
-    let copy = NewFile { path: directory.join("ca.pem"), text: text.into(), secret: false };
+    let content = text.into_bytes().into();
+    let copy = NewFile { path: directory.join("ca.pem"), content, secret: false };
     Ok((authority, vec![copy]))
 }
 
 fn pair(directory: &Path, name: &str, made: PemPair) -> Vec<NewFile> {
     let file = |suffix: &str, text: Zeroizing<String>, secret| NewFile {
         path: directory.join(format!("{name}{suffix}")),
-        text,
+        content: text.as_bytes().to_vec().into(),
         secret,
     };
     vec![file(".pem", made.certificate.into(), false), file("-key.pem", made.key, true)]

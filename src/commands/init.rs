@@ -59,7 +59,8 @@ pub(super) fn write(arguments: &InitArguments) -> Ended {
         stdout.verbatim(&first.text).map_err(stdout_failure)?;
         return Ok(ExitStatus::Done);
     }
-    new_files::create(&[NewFile { path: path.clone(), text: first.text.into(), secret: false }])?;
+    let content = first.text.into_bytes().into();
+    new_files::create(&[NewFile { path: path.clone(), content, secret: false }])?;
     let mut said = account.unwrap_or_default();
     let shown = visible::path(&path);
     said += &format!("wrote {shown}; next:\n");

@@ -77,7 +77,7 @@ fn write(
     new_files::directory(directory)?;
     let file = |name: &str, text: String| NewFile {
         path: directory.join(name),
-        text: text.into(),
+        content: text.into_bytes().into(),
         secret: false,
     };
     let figure = dispersion_figure(&modes.points()).map(|svg| file(FIGURE, svg));

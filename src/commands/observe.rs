@@ -46,8 +46,8 @@ pub(super) async fn observe(arguments: ObserveArguments, isa: Isa, cores: u32) -
         ObservationError::Threads(_) => CommandFailure::failed(error),
     })?;
     if let Some(path) = &out {
-        let text = observations.to_csv();
-        new_files::create(&[NewFile { path: path.clone(), text: text.into(), secret: false }])?;
+        let content = observations.to_csv().into_bytes().into();
+        new_files::create(&[NewFile { path: path.clone(), content, secret: false }])?;
     }
     let summary = observations.summary();
     let shown = ShownObservations { point: &point, summary: &summary, file: out.as_deref() };

@@ -35,7 +35,8 @@ fn run(arguments: &PickArguments) -> Ended {
         picked.extend(of_file(path, description.as_ref())?);
     }
     if let Some(path) = &arguments.out {
-        write(path, to_csv(&picked))?;
+        let picking = description.as_ref().map(|description| description.setup.picking);
+        write(path, to_csv(&picked, &picking.unwrap_or_default()))?;
     }
     let text = match arguments.json {
         true => {
@@ -102,7 +103,11 @@ fn init(arguments: &PickArguments) -> Ended {
 }
 
 fn write(path: &Path, text: String) -> Result<(), CommandFailure> {
-    new_files::create(&[NewFile { path: path.to_owned(), text: text.into(), secret: false }])
+    new_files::create(&[NewFile {
+        path: path.to_owned(),
+        content: text.into_bytes().into(),
+        secret: false,
+    }])
 }
 
 /// Returns a line for each series, for people.

@@ -27,8 +27,8 @@ pub(super) fn make(arguments: &TokenArguments) -> Ended {
         )));
     }
     let token = Token::generate().map_err(CommandFailure::failed)?;
-    let text = Zeroizing::new(format!("{}\n", token.reveal()));
-    new_files::create(&[NewFile { path: out.clone(), text, secret: true }])?;
+    let content = Zeroizing::new(format!("{}\n", token.reveal()).into_bytes());
+    new_files::create(&[NewFile { path: out.clone(), content, secret: true }])?;
     let line = tokens::line(name, role, &token.hash());
     match list {
         Some(list) => {

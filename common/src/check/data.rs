@@ -59,7 +59,7 @@ pub(super) fn data_from(data: &Data, origin: Option<&Origin>, violations: &mut V
     }
     all_subjects(data, origin, violations);
     observables(data, origin, violations);
-    repeatability(data, violations);
+    repeatability(data, origin, violations);
 }
 
 fn moments(mean: f64, coefficient_of_variation: f64, violations: &mut Violations) {
@@ -122,10 +122,14 @@ fn no_subjects(set: &VelocitySet<'_>, subjects: &[u32], is_searched: bool) -> Op
 }
 
 /// Refuses a repeatability as large as the scatter of the data, of which it is a part.
-fn repeatability(data: &Data, violations: &mut Violations) {
-    const FIELD: &str = "data.repeatability";
+fn repeatability(data: &Data, origin: Option<&Origin>, violations: &mut Violations) {
+    let is_of_column = origin.is_some_and(|origin| origin.error_column.is_some());
+    let (field, subject) = match is_of_column {
+        true => ("data.error_column", "has errors whose root mean square is"),
+        false => ("data.repeatability", "is"),
+    };
     let repeatability = data.repeatability;
-    number(FIELD, repeatability, REPEATABILITY, violations);
+    number(field, repeatability, REPEATABILITY, violations);
     if repeatability == 0.0 || violations.has_at_or_below("data") {
         return;
     }
@@ -140,9 +144,9 @@ fn repeatability(data: &Data, violations: &mut Violations) {
         }
         let of = group.map(|group| format!(" of the group {:?}", group.name)).unwrap_or_default();
         violations.add(
-            FIELD,
+            field,
             format!(
-                "is {repeatability:?}; it must be below the standard deviation of the velocities{of}, \
+                "{subject} {repeatability:?}; it must be below the standard deviation of the velocities{of}, \
                  {} m/s, of which it is a part",
                 short(deviation)
             ),

@@ -8,11 +8,13 @@ use crate::velocities::{NamedColumns, VelocityTable, is_like_group, is_like_subj
 
 /// Fewest velocities of a group, on average, for a search of its own.
 const OF_A_GROUP_MIN: usize = 5;
-/// The columns of groups and subjects, if there are any.
+/// The columns of groups, subjects and standard errors, if there are any.
 #[derive(Debug)]
 pub(super) struct Roles {
     pub(super) group: Option<NameColumn>,
     pub(super) subject: Option<NameColumn>,
+    /// Name of the column of standard errors.
+    pub(super) error: Option<String>,
 }
 
 /// A column of names that repeat.
@@ -39,7 +41,7 @@ impl Roles {
             }
             both => both,
         };
-        Self { group, subject }
+        Self { group, subject, error: error_column(table) }
     }
 
     /// Returns the columns as a job names them.
@@ -47,6 +49,7 @@ impl Roles {
         NamedColumns {
             group: self.group.iter().map(|column| column.name.as_str()).collect(),
             subject: self.subject.as_ref().map(|column| column.name.as_str()),
+            error: self.error.as_deref(),
             ..NamedColumns::default()
         }
     }
@@ -63,8 +66,20 @@ impl Roles {
                  that of whole subjects"
             ));
         }
+        if let Some(name) = &self.error {
+            said.push(format!(
+                "standard errors in the column {name:?}: their part of the scatter is not that of the bones"
+            ));
+        }
         said
     }
+}
+
+/// Returns the name of the only column of standard errors.
+fn error_column(table: &VelocityTable) -> Option<String> {
+    let is_one = |name: &&String| name.to_lowercase().replace('_', " ") == "standard error";
+    let mut found = table.names().iter().filter(is_one);
+    found.next().filter(|_| found.next().is_none()).cloned()
 }
 
 /// Returns the columns that have names which repeat, and seem to name groups or subjects.

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use osteon_common::settings::Picking;
+
 use super::roles::Roles;
 use crate::velocities::VelocityTable;
 
@@ -81,7 +83,19 @@ pub(super) fn data_section(name: &str, table: &VelocityTable, roles: &Roles) -> 
     if let Some(subject) = &roles.subject {
         key("subject", quoted(&subject.name));
     }
+    if let Some(error) = &roles.error {
+        key("error_column", quoted(error));
+    }
     text
+}
+
+/// Returns the section of a criterion.
+pub(super) fn picking_section(picking: &Picking) -> String {
+    let Picking { extremum, threshold } = picking;
+    format!(
+        "\n# As the velocities were picked.\n[picking]\nextremum = \"{}\"\nthreshold = {threshold:?}\n",
+        extremum.name()
+    )
 }
 
 /// Returns a text as a string of TOML.

@@ -20,7 +20,7 @@ use crate::velocities::{self, CsvError, CsvFormat, Measured, NamedColumns};
 const MOMENTS: [&str; 2] = ["mean", "coefficient_of_variation"];
 
 /// The keys of `[data]` for a file.
-const KEYS_OF_A_FILE: [Key; 11] = [
+const KEYS_OF_A_FILE: [Key; 12] = [
     Key {
         name: "velocities",
         meaning: "for `identify`: path of a CSV file, relative to the job file's directory, with a \
@@ -79,6 +79,11 @@ const KEYS_OF_A_FILE: [Key; 11] = [
         meaning: "name of the CSV column that holds the subject (patient, specimen) of each velocity: \
                   velocities of one subject are not independent, see [below](#noise-of-the-data); at \
                   least two subjects, in each group",
+    },
+    Key {
+        name: "error_column",
+        meaning: "name of the CSV column that holds the standard error of each velocity, at least 0 and in its \
+                  unit, as `osteon pick` writes it: their root mean square is the `repeatability`",
     },
 ];
 /// Those for groups.
@@ -143,12 +148,16 @@ pub(super) fn read(
     directory: &Path,
     kind: JobKind,
 ) -> (Option<Data>, Option<Origin>) {
-    let mut origin = None;
-    let data = given(reader, root, kind, |path, named, format| {
-        let (measurements, stands) = from_file(&directory.join(path), named, format)?;
-        origin = Some(stands);
+    let (mut origin, mut of_errors) = (None, None);
+    let mut data = given(reader, root, kind, |path, named, format| {
+        let (measurements, repeatability, stands) =
+            from_file(&directory.join(path), named, format)?;
+        (origin, of_errors) = (Some(stands), repeatability);
         Ok(measurements)
     });
+    if let Some((data, repeatability)) = data.as_mut().zip(of_errors) {
+        data.repeatability = repeatability;
+    }
     (data, origin)
 }
 
@@ -191,6 +200,11 @@ fn given(
         }
     };
     let repeatability = reader.number(&table, "repeatability").unwrap_or(0.0);
+    if table.has("repeatability") && table.has("error_column") {
+        let message =
+            "is the root mean square of the errors in `error_column`, too; leave one of them out";
+        reader.violations.add(table.path("repeatability"), message);
+    }
     let data = measurements.map(|measurements| Data { measurements, repeatability });
     if kind == JobKind::Identification {
         return data;
@@ -290,7 +304,7 @@ fn subjects(reader: &mut Reader, table: &Table<'_>) -> Option<Option<Vec<u32>>> 
 }
 
 /// Keys that belong to a file of velocities, and what is wrong with each beside a list.
-const OF_A_FILE: [(&str, &str); 3] = [
+const OF_A_FILE: [(&str, &str); 4] = [
     (
         "group",
         "names a column of a file, but velocities is a list; give the name of a CSV file, or [data.groups]",
@@ -304,6 +318,10 @@ const OF_A_FILE: [(&str, &str); 3] = [
         "subject",
         "names a column of a file, but velocities is a list; give the name of a CSV file, or the list \
          `subjects`",
+    ),
+    (
+        "error_column",
+        "names a column of a file, but velocities is a list; give the name of a CSV file, or `repeatability`",
     ),
 ];
 /// Keys that say how a file of velocities is written.
@@ -332,6 +350,7 @@ fn velocities(
     let path = table.path("velocities");
     let group = group_columns(reader, table);
     let subject = column(reader, table, "subject");
+    let error = column(reader, table, "error_column");
     let observables = PerObservable::new(|one| column(reader, table, one.name()));
     let known = known_columns(reader, table);
     let format = csv_format::read(reader, table);
@@ -362,7 +381,7 @@ fn velocities(
         }
         Value::Text(_) if kind == JobKind::Propagation => None,
         Value::Text(name) => {
-            let named = NamedColumns { group: group?, subject, observables, known };
+            let named = NamedColumns { group: group?, subject, error, observables, known };
             let data = from_file(name, &named, &format?);
             data.map_err(|problems| record(reader, &path, &problems)).ok()
         }
@@ -428,8 +447,9 @@ fn from_file(
     path: &Path,
     named: &NamedColumns<'_>,
     format: &CsvFormat,
-) -> Result<(Measurements, Origin), Vec<CsvError>> {
-    let Measured { data: mut groups, origin, .. } = velocities::read(path, named, format)?;
+) -> Result<(Measurements, Option<f64>, Origin), Vec<CsvError>> {
+    let Measured { data: mut groups, repeatability, origin, .. } =
+        velocities::read(path, named, format)?;
     let measurements = match (named.group.is_empty(), groups.pop()) {
         // Without a column of groups all velocities are in one.
         (true, Some(Group { velocities, subjects, observables, .. })) => {
@@ -440,5 +460,5 @@ fn from_file(
             Measurements::Groups(groups)
         }
     };
-    Ok((measurements, origin))
+    Ok((measurements, repeatability, origin))
 }

@@ -240,6 +240,7 @@ fn data() -> Json {
         lines(),
         json!({ "anyOf": [name(), group_columns] }),
         name(),
+        name(),
     ];
     let of_groups =
         [columns, json!({ "type": "object", "additionalProperties": group }), subjects()];

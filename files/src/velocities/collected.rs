@@ -23,6 +23,8 @@ const UNUSED_NAMES_MAX: usize = 10_000;
 pub(crate) struct Measured<T> {
     /// The velocities, m/s.
     pub(crate) data: T,
+    /// The root mean square of their standard errors, m/s, if there is a column of them.
+    pub(crate) repeatability: Option<f64>,
     /// Their positions in the file.
     pub(crate) origin: Origin,
     /// What was taken and what was not.
@@ -35,6 +37,8 @@ pub(super) struct CollectedVelocities {
     /// Position of each group, by its name.
     places: BTreeMap<String, usize>,
     pub(super) count: usize,
+    /// Sum of the squared standard errors, (m/s)², if there is a column of them.
+    squared_errors: Option<f64>,
     /// What is taken and what is not.
     pub(super) account: Account,
     /// Number of rows with a value that is missing.
@@ -69,6 +73,7 @@ impl CollectedVelocities {
             groups: Vec::new(),
             places: BTreeMap::new(),
             count: 0,
+            squared_errors: None,
             account: Account::of_column(table),
             left_out: 0,
             has_subjects,
@@ -130,6 +135,9 @@ impl CollectedVelocities {
             }
         };
         self.account.take(line, row.velocity, row.has_error);
+        if let Some(error) = row.error {
+            *self.squared_errors.get_or_insert_default() += error * error;
+        }
         let group = &mut self.groups[place];
         group.velocities.push(row.velocity);
         for (observable, value) in row.observables.present() {
@@ -154,12 +162,15 @@ impl CollectedVelocities {
             left_out: self.left_out,
             no_rows: self.account.left_out().to_vec(),
             lines: Vec::with_capacity(self.groups.len()),
+            error_column: columns.error().map(shortened),
+            picking: None,
         };
         self.account.missing = self.left_out;
         self.account.alike = alike(&self.groups);
         let account = self.account;
-        let mut measured =
-            Measured { data: Vec::with_capacity(self.groups.len()), origin, account };
+        let repeatability = self.squared_errors.map(|sum| (sum / self.count as f64).sqrt());
+        let data = Vec::with_capacity(self.groups.len());
+        let mut measured = Measured { data, repeatability, origin, account };
         for CollectedGroup { name, velocities, lines, subjects, observables, known, .. } in
             self.groups
         {

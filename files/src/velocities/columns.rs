@@ -1,6 +1,6 @@
 //! The columns of a table that a job uses, and its rows.
 
-use osteon_common::check::VELOCITY;
+use osteon_common::check::{REPEATABILITY, VELOCITY};
 use osteon_common::observables::{Observable, PerObservable};
 use osteon_common::parameters::Parameter;
 
@@ -18,6 +18,8 @@ pub(crate) struct NamedColumns<'a> {
     pub(crate) group: Vec<&'a str>,
     /// The column of the subject of each velocity.
     pub(crate) subject: Option<&'a str>,
+    /// The column of the standard error of each velocity.
+    pub(crate) error: Option<&'a str>,
     /// The columns of other observables that were measured with each velocity.
     pub(crate) observables: PerObservable<Option<&'a str>>,
     /// The columns of quantities that are known of each group, for each of [`Parameter::OF_SETUP`].
@@ -30,6 +32,7 @@ pub(super) struct Columns<'a> {
     velocity: NamedColumn,
     group: Vec<NamedColumn>,
     subject: Option<NamedColumn>,
+    error: Option<NamedColumn>,
     observables: PerObservable<Option<NamedColumn>>,
     known: [Option<NamedColumn>; Parameter::OF_SETUP.len()],
     /// A column that seems to name subjects, if none is named.
@@ -59,6 +62,8 @@ pub(super) struct Row {
     pub(super) velocity: f64,
     /// Whether an error follows the velocity in its cell.
     pub(super) has_error: bool,
+    /// Standard error of the velocity, m/s, if there is a column of it.
+    pub(super) error: Option<f64>,
     /// Other observables, each in its unit, if there is a column of it.
     pub(super) observables: PerObservable<Option<f64>>,
     /// Quantities that are known of the group.
@@ -88,6 +93,7 @@ impl<'a> Columns<'a> {
         let group = named.group.iter().map(|name| column(Some(name), "group"));
         let group: Vec<_> = group.filter_map(Result::transpose).collect::<Result<_, _>>()?;
         let subject = column(named.subject, "subject")?;
+        let error = column(named.error, "standard error")?;
         let mut observables = PerObservable::default();
         for (observable, name) in named.observables.iter() {
             observables[observable] = column(*name, observable.name())?;
@@ -103,7 +109,7 @@ impl<'a> Columns<'a> {
             *found = column(name, "value")?;
         }
         let choice = &table.choice;
-        Ok(Self { choice, velocity, group, subject, observables, known, like_subjects })
+        Ok(Self { choice, velocity, group, subject, error, observables, known, like_subjects })
     }
 
     /// Returns what a row says; `None` if a value is missing.
@@ -120,6 +126,7 @@ impl<'a> Columns<'a> {
             (None, None) => None,
         };
         let number = |text: &str| self.choice.decimal.number(text);
+        let error = self.error.as_ref().map(|column| self.error_in(column, &fields)).transpose()?;
         let mut observables = PerObservable::default();
         for (observable, column) in self.observables.present() {
             observables[observable] = Some(column.observed_in(observable, &fields, number)?);
@@ -128,13 +135,14 @@ impl<'a> Columns<'a> {
         for (value, column) in known.iter_mut().zip(&self.known) {
             *value = column.as_ref().map(|column| column.number_in(&fields, number)).transpose()?;
         }
-        Ok(Some(Row { group, subject, velocity, has_error, observables, known }))
+        Ok(Some(Row { group, subject, velocity, has_error, error, observables, known }))
     }
 
     /// Returns the columns that must have a value in each row.
     fn used(&self) -> impl Iterator<Item = &NamedColumn> {
         let observables = self.observables.iter().map(|(_, column)| column);
-        let optional = [&self.subject].into_iter().chain(observables).chain(&self.known);
+        let optional =
+            [&self.subject, &self.error].into_iter().chain(observables).chain(&self.known);
         [&self.velocity].into_iter().chain(&self.group).chain(optional.flatten())
     }
 
@@ -168,10 +176,25 @@ impl<'a> Columns<'a> {
         }
     }
 
+    /// Returns the standard error in a row, m/s.
+    fn error_in(&self, column: &NamedColumn, fields: &[String]) -> Result<f64, Problem> {
+        let text = fields[column.place].as_str();
+        let error = self.choice.decimal.number(text).map(|error| error * self.choice.unit.factor());
+        error.filter(|error| REPEATABILITY.contains(*error)).ok_or_else(|| Problem::NotAnError {
+            column: shortened(&column.name),
+            found: shortened(text),
+        })
+    }
+
     /// Returns the name of the column of a known quantity, by its position.
     pub(super) fn known(&self, quantity: usize) -> &str {
         let column = self.known.get(quantity).and_then(Option::as_ref);
         column.map_or("", |column| column.name.as_str())
+    }
+
+    /// Returns the name of the column of standard errors.
+    pub(super) fn error(&self) -> Option<&str> {
+        self.error.as_ref().map(|column| column.name.as_str())
     }
 
     /// Returns the name of a column that seems to name subjects, if none is named.

@@ -228,6 +228,11 @@ pub(crate) enum Problem {
     )]
     NotObserved { column: String, found: String, observable: Observable },
     #[error(
+        "{column} is {found:?}; it must be the standard error of the velocity, at least 0 and in its unit (to leave out \
+         rows without one: [data] missing = [\"\"])"
+    )]
+    NotAnError { column: String, found: String },
+    #[error(
         "{column} is {found:?}; it must be a number (SI units), the same in all rows of a group"
     )]
     NotAKnownValue { column: String, found: String },
