@@ -40,8 +40,8 @@ pub(crate) use realizations::{
 };
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use tools::{
-    CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments, SchemaArguments,
-    SchemaFile, VerbosityArguments,
+    CiteArguments, CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments,
+    SchemaArguments, SchemaFile, VerbosityArguments,
 };
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
@@ -99,6 +99,8 @@ pub(crate) enum Command {
     Token(TokenArguments),
     /// List published stiffness of cortical bone, which job and case files use by name
     Materials(MaterialsArguments),
+    /// Print BibTeX of this program, of its method, and of the materials of a job or case
+    Cite(CiteArguments),
     /// Print the JSON Schema of a job file or of result.json
     Schema(SchemaArguments),
     /// Examine this machine: cores, numerics, disk, limits; and a coordinator

@@ -2,6 +2,7 @@
 
 mod certs;
 mod check;
+mod cite;
 mod coordinator;
 mod design;
 mod doctor;
@@ -83,6 +84,7 @@ fn prepare_command(
         Command::Materials(arguments) => {
             PreparedCommand::brief(move || materials::print(&arguments))
         }
+        Command::Cite(arguments) => PreparedCommand::brief(move || cite::print(&arguments)),
         Command::Schema(arguments) => PreparedCommand::brief(move || schema::print(&arguments)),
         Command::Doctor(arguments) => doctor::prepare(arguments, context)?,
         Command::Completions(arguments) => {

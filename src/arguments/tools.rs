@@ -57,6 +57,15 @@ pub(crate) struct MaterialsArguments {
     pub(crate) json: bool,
 }
 
+/// Arguments of `cite`.
+#[derive(Debug, Args)]
+pub(crate) struct CiteArguments {
+    /// Job or case file, or the directory of a job's results or result.json in it: adds the sources of its
+    /// materials; a result also the version that computed it
+    #[arg(value_name = "FILE")]
+    pub(crate) file: Option<PathBuf>,
+}
+
 /// A file that has a schema.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum SchemaFile {
