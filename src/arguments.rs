@@ -40,8 +40,8 @@ pub(crate) use realizations::{
 };
 pub(crate) use services::{CoordinatorArguments, LogFormat, WorkerArguments};
 pub(crate) use tools::{
-    CiteArguments, CompletionArguments, DoctorArguments, ManArguments, MaterialsArguments,
-    SchemaArguments, SchemaFile, VerbosityArguments,
+    CiteArguments, CompletionArguments, DemoArguments, DoctorArguments, ManArguments,
+    MaterialsArguments, SchemaArguments, SchemaFile, VerbosityArguments,
 };
 
 /// Identifies the elasticity of cortical bone from first-arriving-signal velocities.
@@ -56,6 +56,8 @@ pub(crate) struct Arguments {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Identify the porosity of bones from an example's velocities, and write a report of it
+    Demo(DemoArguments),
     /// Write a first job file for a file of velocities, and say what was understood of it
     Init(InitArguments),
     /// Find the mean elasticity and dispersion that reproduce the measured velocities

@@ -4,6 +4,7 @@ mod certs;
 mod check;
 mod cite;
 mod coordinator;
+mod demo;
 mod design;
 mod doctor;
 mod draw;
@@ -42,6 +43,7 @@ fn prepare_command(
     let isa = ProcessContext::isa;
     Ok(match command {
         Command::Init(arguments) => PreparedCommand::brief(move || init::write(&arguments)),
+        Command::Demo(arguments) => demo::prepare(&arguments, context)?,
         Command::Identify(arguments) => run::prepare_identification(arguments, context)?,
         Command::Propagate(arguments) => run::prepare_propagation(arguments, context)?,
         Command::Simulate(arguments) => PreparedCommand::interruptible(

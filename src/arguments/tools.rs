@@ -22,6 +22,14 @@ pub(crate) struct DoctorArguments {
     pub(crate) json: bool,
 }
 
+/// Arguments of `demo`.
+#[derive(Debug, Args)]
+pub(crate) struct DemoArguments {
+    /// Directory for the example's job and velocities, the results and the report
+    #[arg(value_name = "DIR", default_value = "osteon-demo")]
+    pub(crate) directory: PathBuf,
+}
+
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
 pub(crate) struct CompletionArguments {
