@@ -49,7 +49,7 @@ const FIXTURES: [(&str, Option<&str>); 11] = [
     ("matlab-7.3.mat", None),
     ("arrays.h5", Some("/raw/rf")),
     ("arrays.h5", Some("/raw/time_first")),
-    ("huge.h5", None),
+    ("odd.h5", Some("huge")),
     ("receivers.rcv2D", None),
 ];
 /// Files that are cut off, and files with wrong bytes, of each.

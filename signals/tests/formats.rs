@@ -92,23 +92,32 @@ fn what_is_no_array_of_signals_is_refused_by_its_name() {
         assert!(message.starts_with("signals.variable is "), "{name} {variable:?}: {message}");
         assert!(message.contains(&expected), "{name} {variable:?}: {message}\n{expected}");
     }
-    for (name, axes, expected) in [
-        ("huge.h5", &[][..], "series 1: all 4 signals are constant"),
+    let huge = ("odd.h5", Some("huge"));
+    for ((name, variable), axes, expected) in [
+        (huge, &[][..], "series 1: all 4 signals are constant"),
         (
-            "huge.h5",
+            huge,
             &[Time, Receiver, Series],
             "is damaged: each signal has 20000000 samples; there must be",
         ),
-        ("huge.h5", &[Receiver, Series, Time], "probe.receivers.count is 4, and the file has"),
+        (huge, &[Receiver, Series, Time], "probe.receivers.count is 4, and the file has 20000000"),
         (
-            "scipy-6.mat",
+            ("odd.h5", None),
+            &[],
+            "signals.variable is missing, and the file has \"/huge\" [20000000, 4, 4000], \"/lzf\" [1, 4, 128]; name",
+        ),
+        (
+            ("scipy-6.mat", None),
             &[Time, Receiver],
             "signals.axes is [\"time\", \"receiver\"], and the array has 3",
         ),
     ] {
-        let message = read(name, None, axes).unwrap_err();
+        let message = read(name, variable, axes).unwrap_err();
         assert!(message.starts_with(expected), "{name}: {message}");
     }
+    // A compression that no program but h5py has.
+    let message = read("odd.h5", Some("/lzf"), &[]).unwrap_err();
+    assert!(message.starts_with("is damaged: \"lzf\" cannot be read: unsupported filter"));
 }
 
 #[test]

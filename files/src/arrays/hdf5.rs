@@ -12,7 +12,7 @@ use hdf5_reader::{Dataset, Hdf5File, OpenOptions, SliceInfo, SliceInfoElem};
 
 use super::DamagedArray;
 
-/// Most data sets and groups that are looked at.
+/// Most data sets, and groups, that are looked at.
 const OBJECTS_MAX: usize = 1000;
 /// How deep groups are followed.
 const DEPTH_MAX: usize = 8;
@@ -141,7 +141,8 @@ impl HdfDataset {
             Datatype::FixedPoint { signed: true, .. } => self.decoded(part, |n: i64| n as f64),
             _ => self.decoded(part, |n: u64| n as f64),
         };
-        numbers.map_err(damaged)
+        numbers
+            .map_err(|error| DamagedArray::new(format!("{:?} cannot be read: {error}", self.path)))
     }
 
     fn decoded<T: hdf5_reader::H5Type>(
@@ -187,37 +188,41 @@ fn datasets(file: &Hdf5File, found: u64) -> Result<Vec<HdfDataset>, DamagedArray
     if found < expected {
         return Err(DamagedArray::new(format!("it has {found} bytes of {expected}")));
     }
-    let (mut found, mut looked_at) = (Vec::new(), 0);
+    let mut walk = DatasetWalk::default();
     let root = file.root_group().map_err(damaged)?;
-    group(&root, "", 0, &mut looked_at, &mut found).map_err(damaged)?;
-    Ok(found)
+    walk.group(&root, "", 0).map_err(damaged)?;
+    Ok(walk.found)
 }
 
-fn group(
-    group_of: &Group,
-    path: &str,
-    depth: usize,
-    looked_at: &mut usize,
-    found: &mut Vec<HdfDataset>,
-) -> Result<(), Error> {
-    let (groups, datasets) = group_of.members()?;
-    for dataset in datasets {
-        *looked_at += 1;
-        if *looked_at > OBJECTS_MAX {
+/// A pass over the groups of a file.
+#[derive(Default)]
+struct DatasetWalk {
+    found: Vec<HdfDataset>,
+    /// Addresses of the groups that were seen: links may lead back to one.
+    groups: Vec<u64>,
+}
+
+impl DatasetWalk {
+    fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), Error> {
+        let is_known = self.groups.contains(&group.address());
+        if is_known || depth > DEPTH_MAX || self.groups.len() >= OBJECTS_MAX {
             return Ok(());
         }
-        let path = format!("{path}{}", last_part(dataset.name()));
-        found.push(HdfDataset { path, dataset });
-    }
-    for inner in groups.iter().filter(|_| depth < DEPTH_MAX) {
-        *looked_at += 1;
-        let name = last_part(inner.name());
-        // What MATLAB keeps for itself begins so.
-        if *looked_at <= OBJECTS_MAX && !name.starts_with('#') {
-            group(inner, &format!("{path}{name}/"), depth + 1, looked_at, found)?;
+        self.groups.push(group.address());
+        let (groups, datasets) = group.members()?;
+        for dataset in datasets.into_iter().take(OBJECTS_MAX - self.found.len()) {
+            let path = format!("{path}{}", last_part(dataset.name()));
+            self.found.push(HdfDataset { path, dataset });
         }
+        for inner in groups {
+            let name = last_part(inner.name());
+            // What MATLAB keeps for itself begins so.
+            if !name.starts_with('#') {
+                self.group(&inner, &format!("{path}{name}/"), depth + 1)?;
+            }
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 fn last_part(name: &str) -> &str {

@@ -217,11 +217,11 @@ impl ArrayVariables {
     }
 }
 
-/// Returns those that may be arrays of signals: at least two of the axes are longer than 1.
+/// Returns those that may be arrays of signals: no axis is empty, and at least two are longer than 1.
 fn candidates(list: &[ArrayVariable]) -> impl DoubleEndedIterator<Item = (usize, &ArrayVariable)> {
     list.iter().enumerate().filter(|(_, one)| {
         let long = one.axes.shape.iter().filter(|&&length| length > 1).count();
-        one.other.is_none() && long > 1
+        one.other.is_none() && long > 1 && one.axes.count() > 0
     })
 }
 

@@ -75,9 +75,12 @@ with h5py.File("arrays.h5", "w", libver="latest") as file:
     raw.create_dataset("mixture", data=mixture)
     raw.create_dataset("half", data=noise.astype(np.float16))
 
-# Three hundred billion samples, none of which was ever written.
-with h5py.File("huge.h5", "w") as file:
-    file.create_dataset("rf", shape=(20_000_000, 4, 4000), dtype="<f8", chunks=(1, 4, 4000), compression="gzip")
+# Three hundred billion samples, none of which was ever written; none at all; a compression of h5py's own; a loop.
+with h5py.File("odd.h5", "w") as file:
+    file.create_dataset("huge", shape=(20_000_000, 4, 4000), dtype="<f8", chunks=(1, 4, 4000), compression="gzip")
+    file.create_dataset("none", shape=(0, 4, 160), dtype="<i2")
+    file.create_dataset("lzf", data=signals[:1, :, :128], compression="lzf")
+    file["again"] = file["/"]
 
 # As SimSonic2D writes its arrays of receivers; the grid has steps of 0.02 mm.
 with open("receivers.rcv2D", "wb") as file:
