@@ -73,6 +73,20 @@ fn write_template(out: &mut String, recognized: &RecognizedSignals<'_>) -> std::
     writeln!(out, "extremum = \"first\"")?;
     writeln!(out, "threshold = 0.05  # of the packet's peak\n")?;
     writeln!(out, "[signals]")?;
+    write_layout(out, recognized)?;
+    let transmitters =
+        if is_bidirectional(recognized) { "[\"first\", \"second\"]" } else { "[\"first\"]" };
+    writeln!(out, "transmitters = {transmitters}")?;
+    let high = 2.5 * probe.center_frequency;
+    writeln!(
+        out,
+        "# band = [0.0, {high:?}]  # Hz; for measured signals: 2.5 times the centre frequency"
+    )?;
+    writeln!(out, "# full_scale = 1.0  # the largest value that the recorder can store")
+}
+
+/// Writes how the signals are recorded, as far as the kind of file decides it.
+fn write_layout(out: &mut String, recognized: &RecognizedSignals<'_>) -> std::fmt::Result {
     match recognized {
         RecognizedSignals::Table { step, .. } => {
             writeln!(out, "time_unit = \"{}\"  # of the column of times", unit_of(*step).name())?;
@@ -96,15 +110,7 @@ fn write_template(out: &mut String, recognized: &RecognizedSignals<'_>) -> std::
             writeln!(out, "start = 0.0  # s, of the first sample after the pulse begins")?;
         }
     }
-    let transmitters =
-        if is_bidirectional(recognized) { "[\"first\", \"second\"]" } else { "[\"first\"]" };
-    writeln!(out, "transmitters = {transmitters}")?;
-    let high = 2.5 * probe.center_frequency;
-    writeln!(
-        out,
-        "# band = [0.0, {high:?}]  # Hz; for measured signals: 2.5 times the centre frequency"
-    )?;
-    writeln!(out, "# full_scale = 1.0  # the largest value that the recorder can store")
+    Ok(())
 }
 
 /// Returns position of the first receiver and pitch, m, and number of receivers.

@@ -181,6 +181,11 @@ fn what_is_wrong_with_an_array_is_said() {
     refused(&good, |probe| probe.signals.band = vec![1.0, 3e6], "signals.band is [1.0, 3000000.0]");
     let absurd = npy("<f8", false, &[usize::MAX / 4, 14, 800], &[]);
     refused(&absurd, none, "is damaged: its shape is");
+}
+
+#[test]
+fn what_is_no_array_is_named() {
+    let none = |_: &mut ProbeDescription| ();
     refused(b"PK\x03\x04", none, "is damaged: its directory of arrays is missing or damaged");
     refused(
         b"MATLAB 5.0 MAT-file",
