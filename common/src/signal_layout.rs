@@ -128,8 +128,11 @@ impl Transmitter {
 /// How signals are recorded, and how they are filtered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignalLayout {
-    /// The axes of an array, the slowest first; empty: the usual ones for the number of axes.
+    /// The axes of an array, in the order in which the program that wrote the file has them; empty: the usual
+    /// ones for the number of axes.
     pub axes: Vec<SignalAxis>,
+    /// Name of the array in a file of several.
+    pub variable: Option<String>,
     /// Time between samples, s, above 0; `None`: the file's column of times says it.
     pub sampling_interval: Option<f64>,
     /// Time of an array's first sample after the pulse begins, s; added to the times of a table.
@@ -150,8 +153,14 @@ impl SignalLayout {
     /// The list of axes, which has code of its own.
     pub const AXES: Key = Key {
         name: "axes",
-        meaning: "what each axis of an array counts, the slowest first: `\"series\"`, `\"transmitter\"`, \
-                  `\"receiver\"`, `\"time\"`",
+        meaning: "what each axis of an array counts, in the order of NumPy's `shape` or MATLAB's `size`: \
+                  `\"series\"`, `\"transmitter\"`, `\"receiver\"`, `\"time\"`",
+    };
+    /// The name of an array, which has code of its own.
+    pub const VARIABLE: Key = Key {
+        name: "variable",
+        meaning: "name of the array, if the file has several: `\"x\"`, a field of a structure of MATLAB \
+                  `\"a.b\"`, a data set of HDF5 `\"/a/b\"`",
     };
     /// The list of sources, which has code of its own.
     pub const TRANSMITTERS: Key = Key {
@@ -165,6 +174,7 @@ impl Default for SignalLayout {
     fn default() -> Self {
         Self {
             axes: Vec::new(),
+            variable: None,
             sampling_interval: None,
             start: 0.0,
             time_unit: TimeUnit::default(),
@@ -179,6 +189,7 @@ impl Default for SignalLayout {
 impl Section for SignalLayout {
     fn declare(&mut self, fields: &mut dyn Fields) {
         fields.custom_table(Self::AXES);
+        fields.custom_table(Self::VARIABLE);
         let interval = "time between samples; may be left out for a file with a column of times";
         fields.optional_number(
             Key { name: "sampling_interval", meaning: interval },

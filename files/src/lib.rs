@@ -9,12 +9,14 @@
 
 #![forbid(unsafe_code)]
 
+pub mod arrays;
 mod bone_structure;
 pub mod case_file;
 pub mod document;
 mod document_text;
 pub mod excerpt;
 pub mod file_error;
+pub mod file_kind;
 pub mod init;
 pub mod input_file;
 pub mod job_file;

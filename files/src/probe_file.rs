@@ -75,6 +75,7 @@ fn of_document(
     let section = reader::section(&mut reader, &table, SIGNALS.name, &mut signals);
     let given = names(&mut reader, &section, SignalLayout::AXES.name, SignalAxis::Time);
     signals.axes = given.unwrap_or(signals.axes);
+    signals.variable = variable(&mut reader, &section);
     let given = names(&mut reader, &section, SignalLayout::TRANSMITTERS.name, Transmitter::First);
     signals.transmitters = given.unwrap_or(signals.transmitters);
     check::setup(&setup, &mut reader.violations);
@@ -83,6 +84,19 @@ fn of_document(
         return refused(&reader);
     }
     Ok(ProbeDescription { setup, signals })
+}
+
+/// Reads the name of an array; `None` if it is absent, or no name.
+fn variable(reader: &mut Reader, table: &Table<'_>) -> Option<String> {
+    let key = SignalLayout::VARIABLE.name;
+    let name = reader.text(table, key, "the name of an array in quotes")?;
+    if name.is_empty() || name.len() > limits::NAME_BYTES_MAX {
+        let most = limits::NAME_BYTES_MAX;
+        let message = format!("has {} bytes; it must have 1 to {most}", name.len());
+        reader.violations.add(table.path(key), message);
+        return None;
+    }
+    Some(name.to_owned())
 }
 
 /// Reads the list `key` of choices, each as `any` is; `None` if it is absent, or one of them is no such choice.
@@ -159,6 +173,8 @@ mod tests {
             ("[signals]\naxes = [\"time\", \"time\"]", "signals.axes: has \"time\" 2 times"),
             ("[signals]\naxes = \"time\"", "it must be a list of \"series\", \"transmitter\""),
             ("[signals]\naxes = [1]", "signals.axes[0]: is 1; it must be a text in quotes"),
+            ("[signals]\nvariable = \"\"", "signals.variable: has 0 bytes; it must have 1 to 256"),
+            ("[signals]\nvariable = 1", "it must be the name of an array in quotes"),
             ("[signals]\nband = [3e6, 1e6]", "its first frequency must be below its second"),
             ("[signals]\nband = [-1.0, 1e6]", "signals.band[0]: is -1"),
             ("[signals]\nsampling_interval = 0.0", "signals.sampling_interval: is 0"),

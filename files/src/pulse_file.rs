@@ -6,6 +6,7 @@ use std::path::Path;
 use osteon_common::pulse_samples::{NoPulse, PulseSamples, SAMPLES};
 use thiserror::Error;
 
+use crate::arrays::{DamagedArray, npy};
 use crate::user_file;
 
 /// Limit of a file's length: two numbers of at most 64 characters for each sample that a pulse may have.
@@ -22,10 +23,12 @@ pub(crate) enum PulseFileError {
     Long,
     #[error("has a line {line} that is not two numbers, time in s and value")]
     Line { line: usize },
+    #[error("is not an array of two columns of numbers, time in s and value: {0}")]
+    Array(DamagedArray),
     #[error(
-        "is not an array of two columns of floating-point numbers, time in s and value: {reason}"
+        "is not an array of two columns of numbers, time in s and value: its shape is {shape:?}"
     )]
-    Array { reason: String },
+    Shape { shape: Vec<usize> },
     #[error("has {count} rows; at least {} are needed", SAMPLES.min)]
     Short { count: usize },
     #[error(
@@ -66,56 +69,16 @@ fn row(line: &str) -> Option<[f64; 2]> {
     numbers?.try_into().ok()
 }
 
-/// Returns the rows of an array in NumPy's format: magic bytes, version, the header's length, a header that is a
-/// dictionary in Python's notation, and the numbers.
+/// Returns the rows of an array in NumPy's format.
 fn array(bytes: &[u8]) -> Result<Vec<[f64; 2]>, PulseFileError> {
-    let refused = |reason: String| PulseFileError::Array { reason };
-    let (header, data) =
-        split_header(bytes).ok_or_else(|| refused("it does not begin as one".to_owned()))?;
-    let entry = |key: &str, end: char| {
-        let (_, rest) = header.split_once(key)?;
-        rest.split_once(end).map(|(value, _)| value.trim())
+    let header = npy::header(bytes).map_err(PulseFileError::Array)?;
+    header.check_length(bytes.len() as u64).map_err(PulseFileError::Array)?;
+    let &[rows, 2] = header.shape.as_slice() else {
+        return Err(PulseFileError::Shape { shape: header.shape });
     };
-    let shape = entry("'shape': (", ')').unwrap_or_default();
-    let sizes: Vec<&str> =
-        shape.split(',').map(str::trim).filter(|size| !size.is_empty()).collect();
-    let rows = match sizes.as_slice() {
-        [rows, "2"] => rows.parse().unwrap_or(0),
-        _ => 0_usize,
-    };
-    let numbers = match entry("'descr': '", '\'') {
-        Some("<f8") => numbers(data, f64::from_le_bytes),
-        Some("<f4") => numbers(data, |bytes| f64::from(f32::from_le_bytes(bytes))),
-        other => return Err(refused(format!("its numbers are {}", other.unwrap_or("not named")))),
-    };
-    if rows == 0 || rows.checked_mul(2) != Some(numbers.len()) {
-        let count = numbers.len();
-        return Err(refused(format!("its shape is ({shape}), with {count} numbers")));
-    }
-    let is_by_columns = entry("'fortran_order': ", ',') == Some("True");
-    let at = |row: usize, column: usize| {
-        numbers[if is_by_columns { rows * column + row } else { 2 * row + column }]
-    };
-    Ok((0..rows).map(|row| [at(row, 0), at(row, 1)]).collect())
-}
-
-/// Returns the header of an array in NumPy's format, and what follows it.
-fn split_header(bytes: &[u8]) -> Option<(&str, &[u8])> {
-    let rest = bytes.strip_prefix(b"\x93NUMPY")?;
-    let (version, rest) = rest.split_at_checked(2)?;
-    let (length, rest) = match version[0] {
-        1 => rest
-            .split_first_chunk()
-            .map(|(length, rest)| (u32::from(u16::from_le_bytes(*length)), rest))?,
-        _ => rest.split_first_chunk().map(|(length, rest)| (u32::from_le_bytes(*length), rest))?,
-    };
-    let (header, data) = rest.split_at_checked(usize::try_from(length).ok()?)?;
-    Some((std::str::from_utf8(header).ok()?, data))
-}
-
-/// Returns the numbers of `SIZE` bytes each; a last one that is cut off is left out.
-fn numbers<const SIZE: usize>(data: &[u8], number: impl Fn([u8; SIZE]) -> f64) -> Vec<f64> {
-    data.as_chunks().0.iter().map(|bytes| number(*bytes)).collect()
+    let numbers = header.numbers.decode(bytes.get(header.data..).unwrap_or_default());
+    let (by_row, by_column) = if header.is_by_columns { (1, rows) } else { (2, 1) };
+    Ok((0..rows).map(|row| [numbers[by_row * row], numbers[by_row * row + by_column]]).collect())
 }
 
 /// Returns the step of the rows' times, s.
@@ -211,29 +174,36 @@ mod tests {
             [0, 1].iter().flat_map(|&k| rows.iter().map(move |row| row[k])).collect();
         let single: Vec<u8> = flat.iter().flat_map(|&x| (x as f32).to_le_bytes()).collect();
         let (flat, columns) = (bytes(&flat), bytes(&columns));
-        let is_no_array =
-            "is not an array of two columns of floating-point numbers, time in s and value: ";
+        let is_no_array = "is not an array of two columns of numbers, time in s and value: ";
         for (content, expected) in [
             (npy("<f8", "False", "(40, 2)", &flat), "40 at 5e-8".to_owned()),
             (npy("<f8", "True", "(40, 2)", &columns), "40 at 5e-8".to_owned()),
             (npy("<f4", "False", "(40, 2)", &single), "40 at 5e-8".to_owned()),
             (
                 npy("<f8", "False", "(2, 40)", &columns),
-                format!("{is_no_array}its shape is (2, 40), with 80 numbers"),
+                format!("{is_no_array}its shape is [2, 40]"),
             ),
             (
                 npy("<f8", "False", "(18446744073709551615, 2)", &flat),
-                format!("{is_no_array}its shape is (18446744073709551615, 2), with 80 numbers"),
+                format!(
+                    "{is_no_array}its shape is [18446744073709551615, 2], more than any file has"
+                ),
             ),
             (
                 npy("<f8", "False", "(40, 2)", &flat[..300]),
-                format!("{is_no_array}its shape is (40, 2), with 37 numbers"),
+                format!("{is_no_array}it has 428 bytes, and an array of the shape [40, 2] has 768"),
             ),
-            (npy("<i8", "False", "(40, 2)", &flat), format!("{is_no_array}its numbers are <i8")),
-            (b"no array".to_vec(), format!("{is_no_array}it does not begin as one")),
+            (
+                npy("<c8", "False", "(40, 2)", &flat),
+                format!(
+                    "{is_no_array}its numbers are \"<c8\"; they must be integers or floating-point numbers of \
+                     1 to 8 bytes"
+                ),
+            ),
+            (b"no array".to_vec(), format!("{is_no_array}it is no array of NumPy")),
             (
                 b"\x93NUMPY\x02\x00\xff\xff\xff\xff".to_vec(),
-                format!("{is_no_array}it does not begin as one"),
+                format!("{is_no_array}its header has 4294967295 bytes"),
             ),
         ] {
             assert_eq!(check("pulse.npy", &content), expected);

@@ -17,7 +17,6 @@ mod content;
 mod csv_format;
 mod encodings;
 mod fields;
-mod file_kind;
 mod hdf5;
 mod header;
 mod lines;

@@ -1,36 +1,34 @@
 //! Signals from files: which kind of file it is, and whether it agrees with the description of the probe.
 
+mod array_axes;
 mod array_file;
+mod array_variables;
 mod description;
-mod npy;
-mod npz;
 mod signal_content;
+mod simsonic;
 mod traces_csv;
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use osteon_common::limits::FILE_BYTES_MAX;
+use osteon_files::file_kind::FileKind;
 use osteon_files::probe_file::ProbeDescription;
 use osteon_files::user_file;
 
 use crate::array_signals::{ArraySignals, SignalSeries};
 use crate::reading_error::{SignalFault, SignalFileError};
 
-use self::array_file::{ArrayFile, SeriesBlock};
-use self::signal_content::SignalContent;
+use self::array_file::ArrayFile;
+use self::array_variables::ArrayVariables;
+use self::signal_content::{Recording, SignalContent};
+use self::traces_csv::TraceTable;
 
+pub use self::array_file::RecordedGrid;
 pub use self::description::RecognizedSignals;
-pub(crate) use self::description::usual_axes;
 
-/// How files begin that are recognized and not read, and what they are.
-const OTHERS: [(&[u8], &str); 5] = [
-    (b"\x1f\x8b", "compressed by gzip"),
-    (b"MATLAB", "a MATLAB file"),
-    (b"\x89HDF", "an HDF5 file"),
-    (b"TDSm", "a TDMS file of LabVIEW"),
-    (b"version https://git-lfs", "a pointer of Git LFS and not the file itself"),
-];
+/// Bytes by which the kind of a file is recognized.
+const KIND_BYTES: u64 = 4096;
 
 /// An open file of signals.
 #[derive(Debug)]
@@ -59,7 +57,21 @@ impl SignalFile {
                 step: table.step,
                 samples: table.receivers.first().map_or(0, Vec::len),
             },
-            SignalContent::Array(array) => RecognizedSignals::Array { shape: array.shape() },
+            SignalContent::Array(array) => RecognizedSignals::Array {
+                shape: &array.axes().shape,
+                usual: array.axes().usual(),
+                variable: None,
+                grid: array.grid(),
+            },
+            SignalContent::Variables(variables) => {
+                let (name, axes) = variables.largest();
+                RecognizedSignals::Array {
+                    shape: &axes.shape,
+                    usual: axes.usual(),
+                    variable: variables.is_ambiguous().then_some(name),
+                    grid: None,
+                }
+            }
         }
     }
 
@@ -74,14 +86,27 @@ impl SignalFile {
     ) -> Result<(), SignalFileError> {
         let path = &self.path;
         let located = |fault| SignalFileError::new(path, fault);
-        let recorded = description::check(description, &self.content).map_err(located)?;
+        let mut chosen = None;
+        let wanted = description.signals.variable.as_deref();
+        if let (Some(name), SignalContent::Table(_) | SignalContent::Array(_)) =
+            (wanted, &self.content)
+        {
+            let problem = format!("is {name:?}, and the file's signals have no name");
+            return Err(located(SignalFault::disagrees("signals.variable", problem)));
+        }
+        let mut recording = match &mut self.content {
+            SignalContent::Table(table) => Recording::Table(table),
+            SignalContent::Array(array) => Recording::Array(array),
+            SignalContent::Variables(variables) => {
+                Recording::Array(chosen.insert(variables.open(wanted).map_err(located)?))
+            }
+        };
+        let recorded = description::check(description, &recording).map_err(located)?;
         for number in 0..recorded.series {
-            let directions = match &mut self.content {
-                SignalContent::Table(table) => vec![table.receivers.clone()],
-                SignalContent::Array(array) => {
-                    let block: SeriesBlock =
-                        array.series(&recorded.axes, number).map_err(located)?;
-                    block.directions()
+            let directions = match &mut recording {
+                Recording::Table(table) => vec![table.receivers.clone()],
+                Recording::Array(array) => {
+                    array.series(&recorded.axes, number).map_err(located)?.directions()
                 }
             };
             let transmitters = &description.signals.transmitters;
@@ -102,43 +127,38 @@ impl SignalFile {
 
 fn content(path: &Path) -> Result<SignalContent, SignalFault> {
     let file = user_file::open(path)?;
-    if let Some(array) = ArrayFile::recognize(file)? {
-        return Ok(SignalContent::Array(array));
+    if simsonic::is_called_so(path) {
+        return simsonic::open(file).map(SignalContent::Array);
     }
     let mut begin = Vec::new();
-    user_file::open(path)?.take(2).read_to_end(&mut begin)?;
-    if begin.as_slice() == b"PK" {
-        let max = npz::ARCHIVE_BYTES_MAX;
-        let archive = user_file::read(path, max)?.ok_or(SignalFault::TooLarge { max })?;
-        return archived(&archive).map(SignalContent::Array);
-    }
-    let bytes = user_file::read(path, FILE_BYTES_MAX)?
-        .ok_or(SignalFault::TooLarge { max: FILE_BYTES_MAX })?;
-    if let Some((_, what)) = OTHERS.iter().find(|(begin, _)| bytes.starts_with(begin)) {
-        return Err(SignalFault::OtherKind { what: (*what).to_owned() });
-    }
-    let text = String::from_utf8(bytes).map_err(|_| SignalFault::OtherKind {
-        what: "neither text in UTF-8 nor an array".to_owned(),
-    })?;
-    traces_csv::parse(&text).map(SignalContent::Table)
+    file.take(KIND_BYTES).read_to_end(&mut begin)?;
+    let other = |what: &str| Err(SignalFault::OtherKind { what: what.to_owned() });
+    let variables = match FileKind::recognize(&begin) {
+        FileKind::Numpy => {
+            return ArrayFile::of_numpy(user_file::open(path)?).map(SignalContent::Array);
+        }
+        FileKind::Text => return table(path).map(SignalContent::Table),
+        FileKind::Zip => ArrayVariables::of_archive(bytes(path, array_variables::BYTES_MAX)?),
+        FileKind::Matlab => ArrayVariables::of_matlab(bytes(path, array_variables::BYTES_MAX)?),
+        FileKind::Hdf5 => ArrayVariables::of_hdf5(user_file::open(path)?),
+        FileKind::Gzip => return other("compressed by gzip"),
+        FileKind::CompoundFile => return other("a workbook of Excel before 2007"),
+        FileKind::Other { what, .. } => return other(what),
+    };
+    variables.map(SignalContent::Variables)
 }
 
-/// Returns the array of signals in an archive: the only one, or the only one with several axes.
-fn archived(archive: &[u8]) -> Result<ArrayFile, SignalFault> {
-    let arrays = npz::arrays(archive)?;
-    let names: Vec<String> = arrays.iter().map(|array| array.name.clone()).collect();
-    let arrays: Vec<_> = arrays.into_iter().map(|array| ArrayFile::of_bytes(array.bytes)).collect();
-    let mut arrays: Vec<ArrayFile> = arrays.into_iter().collect::<Result<_, _>>()?;
-    if arrays.len() > 1 {
-        arrays.retain(|array| array.shape().len() > 1);
-    }
-    match (arrays.pop(), arrays.is_empty()) {
-        (Some(only), true) => Ok(only),
-        _ => Err(SignalFault::damaged(format!(
-            "it has the arrays [{}]; it must have one with several axes, that of the signals",
-            names.join(", ")
-        ))),
-    }
+/// Reads a whole file.
+fn bytes(path: &Path, max: u64) -> Result<Vec<u8>, SignalFault> {
+    user_file::read(path, max)?.ok_or(SignalFault::TooLarge { max })
+}
+
+fn table(path: &Path) -> Result<TraceTable, SignalFault> {
+    let text = String::from_utf8(bytes(path, FILE_BYTES_MAX)?);
+    let text = text.map_err(|_| SignalFault::OtherKind {
+        what: "neither text in UTF-8 nor a file of arrays that is known".to_owned(),
+    })?;
+    traces_csv::parse(&text)
 }
 
 /// Refuses a series with numbers that are none, or without any signal.

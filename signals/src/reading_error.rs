@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use osteon_common::visible;
+use osteon_files::arrays::DamagedArray;
 use thiserror::Error;
 
 /// An error in a file of signals; the message names the file.
@@ -38,7 +39,9 @@ pub enum SignalFault {
         max: u64,
     },
     /// It is of no kind that is read.
-    #[error("is {what}; signals are read from CSV, NPY and NPZ files")]
+    #[error(
+        "is {what}; signals are read from CSV, NumPy (NPY, NPZ), MATLAB, HDF5 and SimSonic (rcv2D) files"
+    )]
     OtherKind {
         /// What it is, or seems to be.
         what: String,
@@ -87,6 +90,12 @@ pub enum SignalFault {
         /// What is wrong, and what is allowed.
         problem: String,
     },
+}
+
+impl From<DamagedArray> for SignalFault {
+    fn from(error: DamagedArray) -> Self {
+        Self::damaged(error.to_string())
+    }
 }
 
 impl SignalFault {

@@ -9,7 +9,7 @@ use osteon_files::document::Format;
 use osteon_files::file_error::ContentError;
 use osteon_files::probe_file::{self, ProbeDescription};
 
-use crate::reading::{RecognizedSignals, usual_axes};
+use crate::reading::{RecognizedSignals, RecordedGrid};
 
 /// Sampling intervals, s, of usual recorders: of 4 MHz to 1 GHz.
 const USUAL_INTERVALS: (f64, f64) = (0.9e-9, 2.6e-7);
@@ -36,12 +36,14 @@ pub fn own_description(
 
 fn write_template(out: &mut String, recognized: &RecognizedSignals<'_>) -> std::fmt::Result {
     let probe = Probe::default();
-    let (first, pitch, count) = match *recognized {
+    let (first, pitch, count) = match recognized {
         RecognizedSignals::Table { positions, .. } => receivers_of(positions),
-        RecognizedSignals::Array { shape } => {
-            let axis = likely_axes(shape).iter().position(|&axis| axis == SignalAxis::Receiver);
+        RecognizedSignals::Array { shape, usual, grid, .. } => {
+            let axes = likely_axes(shape, usual);
+            let axis = axes.iter().position(|&axis| axis == SignalAxis::Receiver);
             let count = axis.map_or(probe.receivers.count as usize, |axis| shape[axis]);
-            (probe.receivers.first_x1, probe.receivers.pitch, count)
+            let pitch = grid.map_or(probe.receivers.pitch, |grid| rounded(grid.pitch));
+            (probe.receivers.first_x1, pitch, count)
         }
     };
     writeln!(
@@ -71,18 +73,7 @@ fn write_template(out: &mut String, recognized: &RecognizedSignals<'_>) -> std::
     writeln!(out, "extremum = \"first\"")?;
     writeln!(out, "threshold = 0.05  # of the packet's peak\n")?;
     writeln!(out, "[signals]")?;
-    match *recognized {
-        RecognizedSignals::Table { step, .. } => {
-            writeln!(out, "time_unit = \"{}\"  # of the column of times", unit_of(step).name())?;
-        }
-        RecognizedSignals::Array { shape } => {
-            let axes: Vec<_> =
-                likely_axes(shape).iter().map(|axis| format!("\"{}\"", axis.name())).collect();
-            writeln!(out, "axes = [{}]  # of the lengths {shape:?}", axes.join(", "))?;
-            writeln!(out, "# sampling_interval = 5e-8  # s; must be given")?;
-            writeln!(out, "start = 0.0  # s, of the first sample after the pulse begins")?;
-        }
-    }
+    write_layout(out, recognized)?;
     let transmitters =
         if is_bidirectional(recognized) { "[\"first\", \"second\"]" } else { "[\"first\"]" };
     writeln!(out, "transmitters = {transmitters}")?;
@@ -94,13 +85,44 @@ fn write_template(out: &mut String, recognized: &RecognizedSignals<'_>) -> std::
     writeln!(out, "# full_scale = 1.0  # the largest value that the recorder can store")
 }
 
+/// Writes how the signals are recorded, as far as the kind of file decides it.
+fn write_layout(out: &mut String, recognized: &RecognizedSignals<'_>) -> std::fmt::Result {
+    match recognized {
+        RecognizedSignals::Table { step, .. } => {
+            writeln!(out, "time_unit = \"{}\"  # of the column of times", unit_of(*step).name())?;
+        }
+        RecognizedSignals::Array { shape, usual, variable, grid } => {
+            if let Some(name) = variable {
+                let name = toml::Value::from(*name);
+                writeln!(out, "variable = {name}  # the largest array of several")?;
+            }
+            let axes: Vec<_> = likely_axes(shape, usual)
+                .iter()
+                .map(|axis| format!("\"{}\"", axis.name()))
+                .collect();
+            writeln!(out, "axes = [{}]  # of the lengths {shape:?}", axes.join(", "))?;
+            match grid {
+                Some(RecordedGrid { step, .. }) => {
+                    writeln!(out, "sampling_interval = {step:e}  # s, as the file says")?;
+                }
+                None => writeln!(out, "# sampling_interval = 5e-8  # s; must be given")?,
+            }
+            writeln!(out, "start = 0.0  # s, of the first sample after the pulse begins")?;
+        }
+    }
+    Ok(())
+}
+
 /// Returns position of the first receiver and pitch, m, and number of receivers.
 fn receivers_of(positions: &[f64]) -> (f64, f64, usize) {
-    let rounded = |x: f64| (x * POSITION_STEPS).round() / POSITION_STEPS;
     let first = positions.first().copied().unwrap_or_default();
     let last = positions.last().copied().unwrap_or_default();
     let steps = positions.len().saturating_sub(1).max(1);
     (rounded(first), rounded((last - first) / steps as f64), positions.len())
+}
+
+fn rounded(x: f64) -> f64 {
+    (x * POSITION_STEPS).round() / POSITION_STEPS
 }
 
 /// Returns the unit in which a step of times is that of a usual recorder; seconds, if none is.
@@ -111,10 +133,10 @@ fn unit_of(step: f64) -> TimeUnit {
     TimeUnit::ALL.into_iter().find(is_usual).unwrap_or_default()
 }
 
-/// Returns the axes that an array of this shape may have: the longest is that of time, and a probe has at most
-/// [`RECEIVERS_MAX`] receivers.
-fn likely_axes(shape: &[usize]) -> Vec<SignalAxis> {
-    let mut axes = usual_axes(shape.len()).to_vec();
+/// Returns the axes that an array of this shape may have, which are usually others: the longest is that of time,
+/// and a probe has at most [`RECEIVERS_MAX`] receivers.
+fn likely_axes(shape: &[usize], usual: &[SignalAxis]) -> Vec<SignalAxis> {
+    let mut axes = usual.to_vec();
     let index_of = |axes: &[SignalAxis], axis| axes.iter().position(|&one| one == axis);
     let longest = (0..shape.len()).max_by_key(|&index| shape[index]);
     if let (Some(time), Some(longest)) = (index_of(&axes, SignalAxis::Time), longest) {
@@ -136,8 +158,8 @@ fn likely_axes(shape: &[usize]) -> Vec<SignalAxis> {
 fn is_bidirectional(recognized: &RecognizedSignals<'_>) -> bool {
     match recognized {
         RecognizedSignals::Table { .. } => false,
-        RecognizedSignals::Array { shape } => {
-            let axes = likely_axes(shape);
+        RecognizedSignals::Array { shape, usual, .. } => {
+            let axes = likely_axes(shape, usual);
             axes.iter()
                 .position(|&axis| axis == SignalAxis::Transmitter)
                 .is_some_and(|i| shape[i] == 2)
@@ -172,20 +194,25 @@ mod tests {
         assert!(refused.contains("probe.receivers.count: is 2"), "{refused}");
     }
 
-    fn check(shape: &[usize], expected: &str) {
-        let names: Vec<_> = likely_axes(shape).iter().map(|axis| axis.name()).collect();
+    fn check(usual: &str, shape: &[usize], expected: &str) {
+        let axis = |name: &str| SignalAxis::ALL.into_iter().find(|axis| axis.name() == name);
+        let usual: Vec<_> = usual.split(' ').filter_map(axis).collect();
+        let names: Vec<_> = likely_axes(shape, &usual).iter().map(|axis| axis.name()).collect();
         assert_eq!(names.join(" "), expected, "{shape:?}");
-        let text = template(&RecognizedSignals::Array { shape });
-        let parsed = probe_file::parse(&text, Format::Toml);
-        assert!(parsed.is_ok() || shape.contains(&0), "{text}\n{parsed:?}");
+        let variable = Some("a\"b");
+        let text = template(&RecognizedSignals::Array { shape, usual, variable, grid: None });
+        let parsed = probe_file::parse(&text, Format::Toml).unwrap();
+        assert_eq!(parsed.signals.variable.as_deref(), variable, "{text}");
     }
 
     #[test]
     fn axes_are_told_by_their_lengths() {
-        check(&[2000, 14], "time receiver");
-        check(&[14, 2000], "receiver time");
-        check(&[100, 14, 2000], "series receiver time");
-        check(&[14, 100, 2000], "receiver series time");
-        check(&[100, 2, 14, 2000], "series transmitter receiver time");
+        check("time receiver", &[2000, 14], "time receiver");
+        check("time receiver", &[14, 2000], "receiver time");
+        check("series receiver time", &[100, 14, 2000], "series receiver time");
+        check("series receiver time", &[14, 100, 2000], "receiver series time");
+        check("time receiver series", &[2000, 14, 100], "time receiver series");
+        let four = "series transmitter receiver time";
+        check(four, &[100, 2, 14, 2000], four);
     }
 }

@@ -181,11 +181,21 @@ fn what_is_wrong_with_an_array_is_said() {
     refused(&good, |probe| probe.signals.band = vec![1.0, 3e6], "signals.band is [1.0, 3000000.0]");
     let absurd = npy("<f8", false, &[usize::MAX / 4, 14, 800], &[]);
     refused(&absurd, none, "is damaged: its shape is");
-    refused(b"PK\x03\x04", none, "is damaged: its directory of arrays is missing or cut off");
+}
+
+#[test]
+fn what_is_no_array_is_named() {
+    let none = |_: &mut ProbeDescription| ();
+    refused(b"PK\x03\x04", none, "is damaged: its directory of arrays is missing or damaged");
     refused(
         b"MATLAB 5.0 MAT-file",
         none,
-        "is a MATLAB file; signals are read from CSV, NPY and NPZ files",
+        "is damaged: it is of a big-endian machine, or damaged; save it again",
     );
-    refused(b"\xff\xfe\x00", none, "is neither text in UTF-8 nor an array");
+    refused(
+        b"TDSm\x0e\x00",
+        none,
+        "is a TDMS file of LabVIEW; signals are read from CSV, NumPy (NPY, NPZ), MATLAB, HDF5 and",
+    );
+    refused(b"\xff\xfe\x00", none, "is neither text in UTF-8 nor a file of arrays that is known");
 }

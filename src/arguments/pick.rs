@@ -8,7 +8,8 @@ use clap::Args;
 #[derive(Debug, Args)]
 pub(crate) struct PickArguments {
     /// Files of signals: CSV with the column time (s) and a column for each receiver, headed by its x1 (m), as
-    /// `osteon simulate --out` writes them; or arrays of NumPy (.npy, .npz)
+    /// `osteon simulate --out` writes them; or arrays of NumPy (.npy, .npz), MATLAB (.mat), HDF5 or SimSonic
+    /// (.rcv2D)
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
     /// Probe file (TOML or JSON): probe, layers and picking as in a case file, and signals [default: the

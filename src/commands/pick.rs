@@ -56,9 +56,17 @@ fn of_file(
     description: Option<&ProbeDescription>,
 ) -> Result<Vec<PickedSeries>, CommandFailure> {
     let mut file = SignalFile::open(path).map_err(CommandFailure::bad_input)?;
+    let recognized = file.recognized();
     let own = match description {
         Some(given) => given.clone(),
-        None => own_description(&file.recognized()).map_err(|error| {
+        None if !recognized.has_positions() => {
+            return Err(CommandFailure::bad_input(anyhow!(
+                "{0} does not say where its receivers are; describe its probe (--describe), for which \
+                 `osteon pick --init {0}` writes a first file",
+                visible::path(path)
+            )));
+        }
+        None => own_description(&recognized).map_err(|error| {
             let shown = visible::path(path);
             CommandFailure::bad_input(
                 anyhow!(error).context(format!("{shown} does not describe its probe")),

@@ -45,6 +45,11 @@ pub(super) struct NumberColumn {
     pub(super) numbers: Vec<f64>,
 }
 
+/// Returns whether an array with these lengths is a vector.
+pub(super) fn is_vector(shape: &[usize]) -> bool {
+    shape.iter().filter(|&&length| length != 1).count() == 1
+}
+
 /// Returns tables of columns: those of one length are beside each other, in the order in which they come.
 pub(super) fn tables_of(columns: &[NumberColumn], origin: &str) -> Vec<Content> {
     let mut lengths: Vec<usize> = Vec::new();

@@ -8,9 +8,9 @@ use osteon_common::limits;
 
 use super::content::Content;
 use super::csv_format::CsvFormat;
-use super::file_kind::FileKind;
 use super::problem::{LocatedProblem, Problem};
 use super::{encodings, hdf5, matlab, workbook};
+use crate::file_kind::FileKind;
 use crate::user_file;
 
 /// Reads a file; returns the text in it, or those of its several tables.
@@ -36,6 +36,10 @@ fn of_bytes(bytes: Vec<u8>, format: &CsvFormat) -> Result<Vec<Content>, LocatedP
         FileKind::Zip => workbook::tables(bytes).map_err(no_line),
         FileKind::Matlab => matlab::tables(&bytes).map_err(no_line),
         FileKind::Hdf5 => hdf5::tables(bytes).map_err(no_line),
+        FileKind::Numpy => Err(no_line(Problem::OtherKind {
+            what: "an array of NumPy",
+            cure: "use the Python package, or save it by numpy.savetxt as CSV",
+        })),
         FileKind::Gzip => Err(no_line(Problem::OtherKind {
             what: "compressed by gzip twice",
             cure: "unpack it first",

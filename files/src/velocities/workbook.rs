@@ -6,8 +6,8 @@
 use std::io::{self, Cursor, Read as _};
 
 use calamine::{DataRef, Reader as _, Xlsx};
-use flate2::read::DeflateDecoder;
 use osteon_common::limits;
+use zip::ZipArchive;
 
 use super::content::{Content, field};
 use super::encodings;
@@ -116,35 +116,15 @@ fn shown(value: &DataRef<'_>) -> String {
 /// What an archive says of itself may be wrong; a file in it that is not stored as usual makes it none.
 fn unpacked_length(archive: &[u8]) -> Result<u64, Problem> {
     let damaged = || Problem::Damaged { what: WHAT, reason: "its directory is damaged".to_owned() };
-    let end = archive.windows(4).rposition(|part| part == b"PK\x05\x06").ok_or_else(damaged)?;
-    let number = |at: usize, length: usize| -> Result<usize, Problem> {
-        let bytes = archive.get(at..at + length).ok_or_else(damaged)?;
-        Ok(bytes.iter().rev().fold(0, |number, &byte| number << 8 | usize::from(byte)))
-    };
-    let (mut at, count) = (number(end + 16, 4)?, number(end + 10, 2)?);
+    let mut archive = ZipArchive::new(Cursor::new(archive)).map_err(|_| damaged())?;
     let mut total = 0;
-    for _ in 0..count {
-        if archive.get(at..at + 4) != Some(b"PK\x01\x02") {
-            return Err(damaged());
-        }
-        let (method, packed) = (number(at + 10, 2)?, number(at + 20, 4)?);
-        let local = number(at + 42, 4)?;
-        let begin = local + 30 + number(local + 26, 2)? + number(local + 28, 2)?;
-        let data = archive.get(begin..).ok_or_else(damaged)?;
-        let data = &data[..packed.min(data.len())];
-        total += match method {
-            0 => data.len() as u64,
-            8 => {
-                let room = UNPACKED_BYTES_MAX.saturating_sub(total) + 1;
-                let unpacked = io::copy(&mut DeflateDecoder::new(data).take(room), &mut io::sink());
-                unpacked.map_err(|_| damaged())?
-            }
-            _ => return Err(damaged()),
-        };
+    for index in 0..archive.len() {
+        let file = archive.by_index(index).map_err(|_| damaged())?;
+        let room = UNPACKED_BYTES_MAX - total + 1;
+        total += io::copy(&mut file.take(room), &mut io::sink()).map_err(|_| damaged())?;
         if total > UNPACKED_BYTES_MAX {
-            return Ok(total);
+            break;
         }
-        at += 46 + number(at + 28, 2)? + number(at + 30, 2)? + number(at + 32, 2)?;
     }
     Ok(total)
 }

@@ -1,4 +1,4 @@
-//! Arrays of signals in a file: one series at a time, where the file has them one after the other.
+//! One array of signals of a file: one series at a time, where the file has them one after the other.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -6,27 +6,39 @@ use std::os::unix::fs::FileExt as _;
 
 use osteon_common::limits::SIGNAL_SAMPLES_MAX;
 use osteon_common::signal_layout::SignalAxis;
+use osteon_files::arrays::NumberType;
+use osteon_files::arrays::hdf5::HdfDataset;
+use osteon_files::arrays::npy;
 
-use super::npy::{self, ArrayHeader};
+use super::array_axes::{ArrayAxes, AxisOrder};
 use crate::reading_error::SignalFault;
 
-/// Bytes that contain the header of every array.
-const HEADER_BYTES: u64 = (1 << 16) + 16;
-
-/// Where the bytes of an array are.
+/// Where the numbers of an array are, in the order of the file.
 #[derive(Debug)]
-enum ArrayBytes {
-    /// In a file, from which they are read when they are needed.
-    File(File),
+enum ArraySource {
+    /// In a file, from which they are read when they are needed: their type, and where they begin.
+    File(File, NumberType, usize),
     /// In memory.
-    Memory(Vec<u8>),
+    Memory(Vec<u8>, NumberType, usize),
+    /// In a data set.
+    Dataset(Box<HdfDataset>),
+}
+
+/// What a file says of the signals in its array, beside their values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RecordedGrid {
+    /// Time between samples, s.
+    pub step: f64,
+    /// Distance of neighbouring receivers, m.
+    pub pitch: f64,
 }
 
 /// An array that is read when it is needed.
 #[derive(Debug)]
 pub(crate) struct ArrayFile {
-    bytes: ArrayBytes,
-    header: ArrayHeader,
+    source: ArraySource,
+    axes: ArrayAxes,
+    grid: Option<RecordedGrid>,
     /// All numbers, if the series are not one after the other.
     whole: Option<Vec<f64>>,
 }
@@ -40,50 +52,65 @@ pub(crate) struct SeriesBlock {
 }
 
 impl ArrayFile {
-    /// Takes a file if it is an array of NumPy.
+    /// Takes a file that is an array of NumPy.
     ///
     /// # Errors
-    /// If it is one, and damaged or too large.
-    pub(crate) fn recognize(file: File) -> Result<Option<Self>, SignalFault> {
+    /// If it is damaged.
+    pub(crate) fn of_numpy(file: File) -> Result<Self, SignalFault> {
         let mut start = Vec::new();
-        (&file).take(HEADER_BYTES).read_to_end(&mut start)?;
-        if !start.starts_with(b"\x93NUMPY") {
-            return Ok(None);
-        }
-        let found = file.metadata()?.len();
-        Self::new(&start, found, ArrayBytes::File(file)).map(Some)
+        (&file).take(npy::HEADER_BYTES).read_to_end(&mut start)?;
+        let header = npy::header(&start)?;
+        header.check_length(file.metadata()?.len())?;
+        let axes = ArrayAxes::of_numpy(header.shape, header.is_by_columns);
+        Ok(Self::new(ArraySource::File(file, header.numbers, header.data), axes))
     }
 
     /// Takes the bytes of an array of NumPy.
     ///
     /// # Errors
     /// If they are none, or damaged.
-    pub(crate) fn of_bytes(bytes: Vec<u8>) -> Result<Self, SignalFault> {
-        let start = bytes[..bytes.len().min(HEADER_BYTES as usize)].to_vec();
-        Self::new(&start, bytes.len() as u64, ArrayBytes::Memory(bytes))
+    pub(crate) fn of_numpy_bytes(bytes: Vec<u8>) -> Result<Self, SignalFault> {
+        let header = npy::header(&bytes)?;
+        header.check_length(bytes.len() as u64)?;
+        let axes = ArrayAxes::of_numpy(header.shape, header.is_by_columns);
+        Ok(Self::new(ArraySource::Memory(bytes, header.numbers, header.data), axes))
     }
 
-    /// Takes an array of `found` bytes that begins with those of `start`.
-    fn new(start: &[u8], found: u64, bytes: ArrayBytes) -> Result<Self, SignalFault> {
-        let header = npy::header(start)?;
-        let expected = header
-            .count()
-            .and_then(|count| count.checked_mul(header.numbers.size)?.checked_add(header.data));
-        match expected {
-            Some(expected) if expected as u64 == found => Ok(Self { bytes, header, whole: None }),
-            Some(expected) => Err(SignalFault::damaged(format!(
-                "it has {found} bytes, and an array of the shape {:?} has {expected}",
-                header.shape
-            ))),
-            None => Err(SignalFault::damaged(format!(
-                "its shape is {:?}, more than any file has",
-                header.shape
-            ))),
-        }
+    /// Takes the numbers of a variable of MATLAB.
+    pub(crate) fn of_matlab(bytes: Vec<u8>, numbers: NumberType, shape: Vec<usize>) -> Self {
+        let axes = ArrayAxes { shape, order: AxisOrder::Matlab };
+        Self::new(ArraySource::Memory(bytes, numbers, 0), axes)
     }
 
-    pub(crate) fn shape(&self) -> &[usize] {
-        &self.header.shape
+    /// Takes a data set.
+    pub(crate) fn of_dataset(dataset: HdfDataset, axes: ArrayAxes) -> Self {
+        Self::new(ArraySource::Dataset(Box::new(dataset)), axes)
+    }
+
+    /// Takes the doubles at `data` of a file that are, for each receiver, its samples.
+    pub(crate) fn of_simulation(
+        file: File,
+        data: usize,
+        shape: Vec<usize>,
+        grid: RecordedGrid,
+    ) -> Self {
+        let axes = ArrayAxes { shape, order: AxisOrder::Matlab };
+        let source = ArraySource::File(file, NumberType::DOUBLE, data);
+        Self { grid: Some(grid), ..Self::new(source, axes) }
+    }
+
+    fn new(source: ArraySource, axes: ArrayAxes) -> Self {
+        Self { source, axes, grid: None, whole: None }
+    }
+
+    /// Returns its axes.
+    pub(crate) fn axes(&self) -> &ArrayAxes {
+        &self.axes
+    }
+
+    /// Returns what the file says of its signals.
+    pub(crate) fn grid(&self) -> Option<RecordedGrid> {
+        self.grid
     }
 
     /// Reads series `number`, where `axes` are those of the shape.
@@ -96,22 +123,20 @@ impl ArrayFile {
         number: u64,
     ) -> Result<SeriesBlock, SignalFault> {
         let number = number as usize;
-        let strides = self.strides();
+        let (shape, strides) = (&self.axes.shape, self.axes.strides());
         let place = |axis| axes.iter().position(|&one| one == axis);
-        let along =
-            |axis| place(axis).map_or((1, 0), |index| (self.header.shape[index], strides[index]));
+        let along = |axis| place(axis).map_or((1, 0), |index| (shape[index], strides[index]));
         let three = [SignalAxis::Transmitter, SignalAxis::Receiver, SignalAxis::Time].map(along);
-        let length: usize = three.iter().map(|(length, _)| length).product();
-        let (_, between) = along(SignalAxis::Series);
+        let (series, between) = along(SignalAxis::Series);
+        let length = three.iter().fold(1_usize, |count, (length, _)| count.saturating_mul(*length));
         // Series one after the other are read one after the other.
         if place(SignalAxis::Series).is_none() || between == length {
-            let numbers = self.read(number * length, length)?;
+            let numbers = self.read(number, length, series)?;
             return Ok(SeriesBlock { numbers, axes: three });
         }
-        let count = self.header.count().unwrap_or(usize::MAX);
         let whole = match self.whole.take() {
             Some(whole) => whole,
-            None => self.read(0, count)?,
+            None => self.read(0, self.axes.count(), 1)?,
         };
         let first = number * between;
         let last = three.iter().fold(first, |last, (length, stride)| last + (length - 1) * stride);
@@ -120,47 +145,31 @@ impl ArrayFile {
         Ok(SeriesBlock { numbers, axes: three })
     }
 
-    /// Returns how many numbers apart neighbours along each axis are.
-    fn strides(&self) -> Vec<usize> {
-        let shape = &self.header.shape;
-        let mut strides = vec![1; shape.len()];
-        match self.header.is_by_columns {
-            true => {
-                for index in 1..shape.len() {
-                    strides[index] = strides[index - 1] * shape[index - 1];
-                }
-            }
-            false => {
-                for index in (1..shape.len()).rev() {
-                    strides[index - 1] = strides[index] * shape[index];
-                }
-            }
-        }
-        strides
-    }
-
-    fn read(&self, first: usize, count: usize) -> Result<Vec<f64>, SignalFault> {
+    /// Reads part `index` of `parts` of the array, each of `count` numbers.
+    fn read(&self, index: usize, count: usize, parts: usize) -> Result<Vec<f64>, SignalFault> {
         if count as u64 > SIGNAL_SAMPLES_MAX {
             return Err(SignalFault::disagrees(
                 "signals.axes",
                 format!(
-                    "asks for {count} samples at once, and at most {SIGNAL_SAMPLES_MAX} are read; put the axis \
-                     of series first, or split the file"
+                    "asks for {count} samples at once, and at most {SIGNAL_SAMPLES_MAX} are read; make the axis \
+                     of series the slowest of the file, or split the file"
                 ),
             ));
         }
-        let size = self.header.numbers.size;
-        let offset = self.header.data + first * size;
-        match &self.bytes {
-            ArrayBytes::File(file) => {
-                let mut bytes = vec![0; count * size];
+        match &self.source {
+            ArraySource::File(file, numbers, data) => {
+                let mut bytes = vec![0; count * numbers.size()];
+                let offset = data + index * bytes.len();
                 file.read_exact_at(&mut bytes, offset as u64)?;
-                Ok(self.header.numbers.decode(&bytes))
+                Ok(numbers.decode(&bytes))
             }
-            ArrayBytes::Memory(bytes) => {
-                let part = bytes.get(offset..offset + count * size).unwrap_or_default();
-                Ok(self.header.numbers.decode(part))
+            ArraySource::Memory(bytes, numbers, data) => {
+                let length = count * numbers.size();
+                let part = bytes.get(data + index * length..).unwrap_or_default();
+                Ok(numbers.decode(part.get(..length).unwrap_or_default()))
             }
+            // The axis of the series is then the slowest one.
+            ArraySource::Dataset(set) => Ok(set.numbers((parts > 1).then_some(index))?),
         }
     }
 }

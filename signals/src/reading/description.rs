@@ -4,7 +4,8 @@ use osteon_common::limits::SIGNAL_LENGTH_MAX;
 use osteon_common::signal_layout::{SignalAxis, SignalLayout};
 use osteon_files::probe_file::ProbeDescription;
 
-use super::signal_content::SignalContent;
+use super::array_file::{ArrayFile, RecordedGrid};
+use super::signal_content::Recording;
 use super::traces_csv::TraceTable;
 use crate::array_geometry::ArrayGeometry;
 use crate::interpolation::{EDGE, HALF_WIDTH};
@@ -22,7 +23,7 @@ const KEPT_BAND: (f64, f64) = (0.5, 1.5);
 const LOWEST: f64 = 0.02;
 
 /// What a file says of itself.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum RecognizedSignals<'a> {
     /// A table of one series.
     Table {
@@ -37,9 +38,22 @@ pub enum RecognizedSignals<'a> {
     },
     /// An array.
     Array {
-        /// Lengths of its axes.
+        /// Lengths of its axes, as the program that wrote it shows them.
         shape: &'a [usize],
+        /// What these axes usually count in such a file.
+        usual: Vec<SignalAxis>,
+        /// Its name, if the file has several from which a description must choose.
+        variable: Option<&'a str>,
+        /// What the file says of its signals.
+        grid: Option<RecordedGrid>,
     },
+}
+
+impl RecognizedSignals<'_> {
+    /// Returns whether the file says where its receivers are.
+    pub fn has_positions(&self) -> bool {
+        matches!(self, Self::Table { .. })
+    }
 }
 
 /// How the series of a file are recorded.
@@ -54,25 +68,14 @@ pub(super) struct RecordedSeries {
     pub(super) step: f64,
 }
 
-/// Returns the usual axes of an array with so many; empty if there are none.
-pub(crate) fn usual_axes(count: usize) -> &'static [SignalAxis] {
-    use SignalAxis::{Receiver, Series, Time, Transmitter};
-    match count {
-        2 => &[Time, Receiver],
-        3 => &[Series, Receiver, Time],
-        4 => &[Series, Transmitter, Receiver, Time],
-        _ => &[],
-    }
-}
-
 /// Checks a file against its description.
 pub(super) fn check(
     description: &ProbeDescription,
-    content: &SignalContent,
+    recording: &Recording<'_>,
 ) -> Result<RecordedSeries, SignalFault> {
-    let (recorded, samples) = match content {
-        SignalContent::Table(table) => (of_table(description, table)?, rows(table)),
-        SignalContent::Array(array) => of_array(description, array.shape())?,
+    let (recorded, samples) = match recording {
+        Recording::Table(table) => (of_table(description, table)?, rows(table)),
+        Recording::Array(array) => of_array(description, array)?,
     };
     record(description, &recorded, samples)?;
     band(description, recorded.step)?;
@@ -105,28 +108,41 @@ fn of_table(
     transmitter_count(signals, 1)?;
     let scale = signals.time_unit.per_second();
     let step = table.step / scale;
-    if let Some(given) = signals.sampling_interval
-        && (given / step - 1.0).abs() > INTERVAL_ERROR_MAX
-    {
-        return Err(SignalFault::disagrees(
-            "signals.sampling_interval",
-            format!(
-                "is {given:e} s, and the file's column of times has steps of {step:e} s if its unit is \"{}\"",
-                signals.time_unit.name()
-            ),
-        ));
+    interval(signals, step, || {
+        let unit = signals.time_unit.name();
+        format!("the file's column of times has steps of {step:e} s if its unit is \"{unit}\"")
+    })?;
+    Ok(RecordedSeries {
+        axes: Vec::new(),
+        series: 1,
+        start: signals.start + table.start / scale,
+        step,
+    })
+}
+
+/// Checks that a sampling interval that is given agrees with that of the file, of which `said` tells.
+fn interval(
+    signals: &SignalLayout,
+    step: f64,
+    said: impl Fn() -> String,
+) -> Result<(), SignalFault> {
+    match signals.sampling_interval {
+        Some(given) if (given / step - 1.0).abs() > INTERVAL_ERROR_MAX => {
+            let problem = format!("is {given:e} s, and {}", said());
+            Err(SignalFault::disagrees("signals.sampling_interval", problem))
+        }
+        _ => Ok(()),
     }
-    let axes = usual_axes(2).to_vec();
-    Ok(RecordedSeries { axes, series: 1, start: signals.start + table.start / scale, step })
 }
 
 fn of_array(
     description: &ProbeDescription,
-    shape: &[usize],
+    array: &ArrayFile,
 ) -> Result<(RecordedSeries, usize), SignalFault> {
     let signals = &description.signals;
+    let shape = array.axes().shape.as_slice();
     let axes = match signals.axes.is_empty() {
-        true => usual_axes(shape.len()).to_vec(),
+        true => array.axes().usual(),
         false => signals.axes.clone(),
     };
     if axes.len() != shape.len() || axes.is_empty() {
@@ -134,7 +150,7 @@ fn of_array(
         return Err(SignalFault::disagrees(
             "signals.axes",
             format!(
-                "is [{}], and the array has {} axes, of the lengths {shape:?}; name each, the slowest first",
+                "is [{}], and the array has {} axes, of the lengths {shape:?}; name each, in this order",
                 names.join(", "),
                 shape.len()
             ),
@@ -154,16 +170,25 @@ fn of_array(
         "elements along \"receiver\"",
     )?;
     transmitter_count(signals, length(SignalAxis::Transmitter).unwrap_or(1))?;
-    let step = signals.sampling_interval.ok_or_else(|| {
+    let step = array_step(signals, array.grid())?;
+    let series = length(SignalAxis::Series).unwrap_or(1) as u64;
+    let samples = length(SignalAxis::Time).unwrap_or(0);
+    Ok((RecordedSeries { axes, series, start: signals.start, step }, samples))
+}
+
+/// Returns the time between the samples of an array, s.
+fn array_step(signals: &SignalLayout, grid: Option<RecordedGrid>) -> Result<f64, SignalFault> {
+    if let Some(RecordedGrid { step, .. }) = grid {
+        interval(signals, step, || format!("the file says that it is {step:e} s"))?;
+        return Ok(step);
+    }
+    signals.sampling_interval.ok_or_else(|| {
         SignalFault::disagrees(
             "signals.sampling_interval",
             "is missing; an array has no times: give the time between samples, in s, in a probe file \
              (--describe)",
         )
-    })?;
-    let series = length(SignalAxis::Series).unwrap_or(1) as u64;
-    let samples = length(SignalAxis::Time).unwrap_or(0);
-    Ok((RecordedSeries { axes, series, start: signals.start, step }, samples))
+    })
 }
 
 fn receiver_count(

@@ -1,6 +1,7 @@
 //! What is in a file of signals.
 
 use super::array_file::ArrayFile;
+use super::array_variables::ArrayVariables;
 use super::traces_csv::TraceTable;
 
 /// The content of a file, as far as it has been read.
@@ -10,4 +11,15 @@ pub(super) enum SignalContent {
     Table(TraceTable),
     /// An array of any number of series.
     Array(ArrayFile),
+    /// Arrays with names.
+    Variables(ArrayVariables),
+}
+
+/// The part of a content that a description describes.
+#[derive(Debug)]
+pub(super) enum Recording<'a> {
+    /// A table of one series.
+    Table(&'a TraceTable),
+    /// The array that has the signals.
+    Array(&'a mut ArrayFile),
 }

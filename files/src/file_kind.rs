@@ -1,12 +1,15 @@
 //! What kind of file some bytes are, by how they begin.
 
+use crate::arrays::npy;
+
 /// A file that is no text, or none of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FileKind {
+pub enum FileKind {
     /// Text, as far as its first bytes say.
     Text,
+    /// Compressed by gzip.
     Gzip,
-    /// A ZIP archive, which workbooks are.
+    /// A ZIP archive, which workbooks and NumPy's archives are.
     Zip,
     /// The container of workbooks before 2007.
     CompoundFile,
@@ -14,9 +17,13 @@ pub(super) enum FileKind {
     Matlab,
     /// HDF5, which MATLAB 7.3 writes, too.
     Hdf5,
-    /// Something that is not read, and what to do with it.
+    /// An array of NumPy.
+    Numpy,
+    /// Something that is not read.
     Other {
+        /// What it is, as part of a sentence.
         what: &'static str,
+        /// What to do to get velocities from it.
         cure: &'static str,
     },
 }
@@ -26,15 +33,10 @@ const EXPORT: &str = "write its column of velocities as CSV";
 const UNPACK: &str = "unpack it first";
 
 /// How kinds of files that are not read begin, what they are, and what to do.
-const OTHERS: [(&[u8], &str, &str); 28] = [
+const OTHERS: [(&[u8], &str, &str); 27] = [
     (b"PAR1", "a Parquet file", EXPORT),
     (b"ARROW1", "an Arrow file", EXPORT),
     (b"FEA1", "a Feather file", EXPORT),
-    (
-        b"\x93NUMPY",
-        "an array of NumPy",
-        "use the Python package, or save it by numpy.savetxt as CSV",
-    ),
     (b"\x80\x04\x95", "a pickle of Python", EXPORT),
     (b"RDX", "data of R", "write them by write.csv(…, row.names = FALSE)"),
     (b"X\nV=", "data of R", "write them by write.csv(…, row.names = FALSE)"),
@@ -81,8 +83,8 @@ const TEXTS: [(&str, &str, &str); 6] = [
 const TAR_MARK_AT: usize = 257;
 
 impl FileKind {
-    /// Returns the kind of a file with these bytes.
-    pub(super) fn recognize(bytes: &[u8]) -> Self {
+    /// Returns the kind of a file with these bytes, of which the first 4096 suffice.
+    pub fn recognize(bytes: &[u8]) -> Self {
         let begins = |with: &[u8]| bytes.starts_with(with);
         if begins(b"\x1f\x8b") {
             return Self::Gzip;
@@ -99,6 +101,9 @@ impl FileKind {
             .any(|at| bytes.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n")));
         if is_hdf5 {
             return Self::Hdf5;
+        }
+        if begins(npy::MAGIC) {
+            return Self::Numpy;
         }
         if begins(b"MATLAB 5.0 MAT-file") || begins(b"MATLAB 7.3 MAT-file") {
             return Self::Matlab;
@@ -153,6 +158,7 @@ mod tests {
             FileKind::CompoundFile => "compound",
             FileKind::Matlab => "matlab",
             FileKind::Hdf5 => "hdf5",
+            FileKind::Numpy => "numpy",
         };
         let padded = [&b"MATLAB 7.3 MAT-file"[..], &[b' '; 493], b"\x89HDF\r\n\x1a\n"].concat();
         let tar = [&b"velocities.csv"[..], &[0; 243], b"ustar"].concat();
