@@ -29,7 +29,7 @@ fn example(scratch: &Scratch, name: &str, without: bool) -> PathBuf {
     let job = fs::read_to_string(examples.join("decays.toml")).unwrap();
     let mut job = job.replace("realizations = 256", "realizations = 64");
     if without {
-        job = job.replace("\ndecay = \"decay\"\n", "\n");
+        job = job.lines().filter(|line| !line.starts_with("decay")).collect::<Vec<_>>().join("\n");
     }
     scratch.write(name, &job)
 }
@@ -86,8 +86,8 @@ fn the_table_of_observe_is_data_of_an_identification() {
     run(&["observe", text(&bones), "--out", text(&table)]).succeeded();
     let job = scratch.write(
         "job.toml",
-        "[data]\nvelocities = \"observed.csv\"\ndecay = \"decay\"\n\
-         other_velocity = \"other_velocity\"\ncenter_frequency = \"center_frequency\"\n\
+        "[data]\nvelocities = \"observed.csv\"\ndecay = \"decay\"\ndecay_spreading = \"line\"\n\
+         decay_error = 0\nother_velocity = \"other_velocity\"\ncenter_frequency = \"center_frequency\"\n\
          [parameters]\nmaterial = \"human-radius-desceliers\"\n\
          longitudinal_young_modulus = { start = 20.0e9, bounds = [14.0e9, 25.0e9] }\n\
          longitudinal_shear_modulus = { start = 4.2e9, bounds = [3.0e9, 6.5e9] }\n\

@@ -25,7 +25,9 @@ use crate::job::JobSpecification;
 use crate::violations::Violations;
 
 pub use self::bone_structure::porosity_profile;
-pub use self::data::{COUNT, DATA_FORMS, REPEATABILITY, VELOCITIES_MIN, VELOCITY, data, no_data};
+pub use self::data::{
+    COUNT, DATA_FORMS, DECAY_ERROR, REPEATABILITY, VELOCITIES_MIN, VELOCITY, data, no_data,
+};
 pub use self::job::{job, job_from};
 pub use self::porosity::{porosity, porosity_model};
 pub use self::posterior::posterior;

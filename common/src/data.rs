@@ -16,6 +16,9 @@ pub struct Data {
     /// Standard deviation of repeated measurements of the same place, m/s, at least 0. Its square is
     /// a part of the data's variance, and not of the model's; 0 if it is not known.
     pub repeatability: f64,
+    /// Standard deviation of an error that all decays have in common, dB/cm, at least 0: that of the receivers'
+    /// gains. No scatter of the data shows it.
+    pub decay_error: f64,
 }
 
 /// The measured velocities, or their moments.
@@ -143,7 +146,7 @@ impl Data {
 
     /// Creates data of an instrument without scatter of its own.
     const fn exact(measurements: Measurements) -> Self {
-        Self { measurements, repeatability: 0.0 }
+        Self { measurements, repeatability: 0.0, decay_error: 0.0 }
     }
 
     /// Returns the groups; none if the data are not grouped.

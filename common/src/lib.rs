@@ -65,6 +65,7 @@ pub mod shift;
 pub mod signal_layout;
 mod sobol;
 pub mod special;
+pub mod spreading;
 pub mod statistics;
 pub mod systematic;
 pub mod version;

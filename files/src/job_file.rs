@@ -2,6 +2,7 @@
 
 mod csv_format;
 mod data_section;
+pub(crate) mod decays;
 mod key_tables;
 mod observables;
 mod parameters;
@@ -157,7 +158,7 @@ fn of_tree(
     let mut setup = setup(&mut reader, &table, directory);
     let thickness = &mut setup.layers.bone_thickness;
     setup.structure = bone_structure::of_job(&mut reader, &table, thickness);
-    let (data, origin) = data_section::read(&mut reader, &table, directory, kind);
+    let (data, origin) = data_section::read(&mut reader, &table, (directory, &setup), kind);
     let posterior = posterior::read(&mut reader, &table);
     let (objective, objective_omitted) = objective(&mut reader, &table);
     let (search, cost_tolerance_omitted) = search(&mut reader, &table);

@@ -19,6 +19,7 @@ use osteon_common::pulse::PulseForm;
 use osteon_common::setup_quantity::SetupQuantity;
 use osteon_common::signal_layout::SignalLayout;
 
+use crate::job_file::decays;
 use crate::probe_file::{ProbeDescription, SIGNALS};
 
 /// Number of velocities per line of an inlined data set.
@@ -246,7 +247,8 @@ fn mandel(out: &mut String, elasticity: &Elasticity) -> fmt::Result {
 
 fn data(out: &mut String, data: &Data) -> fmt::Result {
     let repeatability = data.repeatability;
-    if !data.is_grouped() || repeatability != 0.0 {
+    let of_decays = decays::to_toml(data);
+    if !data.is_grouped() || repeatability != 0.0 || !of_decays.is_empty() {
         writeln!(out, "\n[data]  # m/s")?;
     }
     match &data.measurements {
@@ -265,6 +267,7 @@ fn data(out: &mut String, data: &Data) -> fmt::Result {
     if repeatability != 0.0 {
         writeln!(out, "repeatability = {repeatability:?}")?;
     }
+    out.push_str(&of_decays);
     if data.is_grouped() { groups(out, data.groups()) } else { Ok(()) }
 }
 

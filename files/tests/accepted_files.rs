@@ -445,7 +445,8 @@ fn decays_are_inlined() {
         let (velocities, decays) = (list(start, 7), list(4, 13));
         format!("groups.{name} = {{ velocities = {velocities:?}, decays = {decays:?} }}\n")
     };
-    let data = group("b", 3900) + &group("a", 3950);
+    let keys = "decay_spreading = \"line\"\ndecay_error = 0.25\n";
+    let data = keys.to_owned() + &group("b", 3900) + &group("a", 3950);
     let text = include_str!("files/job.toml").replace(given, &data);
     let text = text.replace("kind = \"moments\"", "kind = \"chi_square\"");
     let read = job(&text, Format::Toml, JobKind::Identification);

@@ -73,7 +73,7 @@ fn decays_are_a_column() {
     let row = |k: u32| (3900.0 + f64::from(k * k), 4.5 + f64::from(k * 7 % 10) / 10.0);
     let rows: Vec<(f64, f64)> = (0..10).map(row).collect();
     let lines: String = rows.iter().map(|(v, d)| format!("{d:?},{v:?}\n")).collect();
-    let more = "decay = \"dB/cm\"";
+    let more = "decay = \"dB/cm\"\ndecay_spreading = \"line\"\ndecay_error = 0.2";
     let data = read_as(format!("dB/cm,velocity\n{lines}").as_bytes(), more).unwrap().unwrap();
     let (velocities, decays): (Vec<f64>, Vec<f64>) = rows.into_iter().unzip();
     let found = data.set(0).unwrap();

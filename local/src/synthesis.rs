@@ -120,7 +120,7 @@ impl SyntheticStudy {
         (isa, threads): (Isa, usize),
         done: impl Fn() + Sync,
     ) -> Result<Self, SynthesisError> {
-        let recording = Recording::new(specification, point, recorder, isa)?;
+        let recording = RecordingDevice::new(specification, point, recorder, isa)?;
         let each = recording.samples_of_series();
         if series.saturating_mul(each) > SIGNAL_SAMPLES_MAX {
             return Err(SynthesisError::TooLarge { series, each });
@@ -166,7 +166,7 @@ impl SyntheticStudy {
 }
 
 /// What all series have in common.
-struct Recording<'a> {
+struct RecordingDevice<'a> {
     specification: &'a JobSpecification,
     ensemble: Ensemble,
     solver: Solver,
@@ -183,7 +183,7 @@ struct Recording<'a> {
     count: f64,
 }
 
-impl<'a> Recording<'a> {
+impl<'a> RecordingDevice<'a> {
     fn new(
         specification: &'a JobSpecification,
         point: &Point,

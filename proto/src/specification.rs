@@ -131,7 +131,11 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
 }
 
 fn data_to_message(data: &Data) -> v1::Data {
-    let message = v1::Data { repeatability: Some(data.repeatability), ..v1::Data::default() };
+    let message = v1::Data {
+        repeatability: Some(data.repeatability),
+        decay_error: Some(data.decay_error),
+        ..v1::Data::default()
+    };
     let numbers = |subjects: &Option<Vec<u32>>| subjects.clone().unwrap_or_default();
     match &data.measurements {
         Measurements::Velocities { velocities, subjects, observables } => v1::Data {
@@ -180,7 +184,9 @@ fn data_from_message(message: &v1::Data, violations: &mut Violations) -> Option<
                        they are not given; leave it out";
         violations.add("data.count", message);
     }
-    Some(Data { measurements, repeatability: message.repeatability.unwrap_or(0.0) })
+    let [repeatability, decay_error] =
+        [message.repeatability, message.decay_error].map(Option::unwrap_or_default);
+    Some(Data { measurements, repeatability, decay_error })
 }
 
 fn measurements(message: &v1::Data, violations: &mut Violations) -> Option<Measurements> {

@@ -4,7 +4,7 @@
     >>> round(osteon.simulate("examples/cases/A.toml").velocity, 1)
     3908.8
 
-:func:`simulate` and :func:`velocities` solve cases, :func:`ensemble` draws random bones, :class:`Job`
+:func:`simulate` and :func:`velocities` solve cases, :func:`pick` takes velocities from signals, :func:`ensemble` draws random bones, :class:`Job`
 identifies, on this machine or on a cluster, and :class:`Client` speaks to a coordinator. :mod:`osteon.workers`
 starts workers inside of Dask and Ray, :mod:`osteon.rpc` helps programs that speak gRPC themselves.
 """
@@ -15,6 +15,7 @@ from osteon._jobs import Job
 from osteon._native import Case
 from osteon._native import version as _version
 from osteon._objects import Moments
+from osteon._pick import Picks, pick
 from osteon._results import Estimate, Group, Result, Tables
 from osteon._simulate import Ensemble, Simulation, ensemble, simulate, velocities
 from osteon._states import Credentials, JobState
@@ -49,6 +50,7 @@ __all__ = [
     "NUMERICS_REVISION",
     "OsteonError",
     "OsteonWarning",
+    "Picks",
     "ProgramError",
     "Result",
     "Simulation",
@@ -57,6 +59,7 @@ __all__ = [
     "Violation",
     "__version__",
     "ensemble",
+    "pick",
     "simulate",
     "velocities",
     "workers",

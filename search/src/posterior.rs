@@ -4,7 +4,7 @@
 //! other observables that were measured. These are smooth functions of the parameters, and a closed form
 //! nearly gives those of the velocities. So the model is evaluated at
 //! some hundred points, its moments are interpolated (`surrogate.rs`), and the posterior of the
-//! interpolated model is drawn by importance sampling (`population.rs`), at next to no cost. Fresh
+//! interpolated model is drawn by importance sampling (`problem.rs`), at next to no cost. Fresh
 //! draws are evaluated, batch by batch: the ratio of the evaluated density to the interpolated one
 //! shows whether the result is that of the model itself. If it is not, the batch improves the
 //! interpolation, and the next one is drawn from that.
@@ -15,8 +15,9 @@
 //! all draws, which has to be small, too. (Points of the largest error, whatever their probability,
 //! would be the textbook's choice. With 200 of them the interpolation was seven times less accurate
 //! over the posterior than with draws: they lie in remote corners.) With one or two, batches are drawn
-//! from a wider law. If no point within the bounds matches the data as far as is known, draws of the
-//! prior are evaluated first.
+//! from a wider law. If hardly a point of the prior matches the data as far as is known, draws of the
+//! prior are evaluated first, then points that the interpolation believes to be near the data, and populations are
+//! drawn about these: what matches may fill a ten thousandth of the bounds, in a corner where the closed form is wrong.
 //!
 //! All of this is a function of the specification and the evaluations, in their order.
 
@@ -33,6 +34,7 @@ mod pareto;
 mod pivot;
 mod population;
 mod prior;
+mod problem;
 mod summary;
 mod surrogate;
 #[cfg(test)]
@@ -46,8 +48,8 @@ use osteon_common::results::{BestPoint, ComparedMoments, Evaluation};
 pub(crate) use self::batches::{PosteriorSearch, SearchOutcome};
 pub use self::density::PosteriorDensity;
 pub(crate) use self::likelihood::SetLikelihood;
-pub(crate) use self::population::closed_form;
 pub use self::prior::prior_deviation;
+pub(crate) use self::problem::closed_form;
 
 /// Returns the posterior of set number `set` of the data, given the best point of its search and all
 /// evaluations of the job; `None` if the job asks for none, or its evaluations are not complete.

@@ -6,6 +6,7 @@ use crate::accepted::{Interval, WholeRange};
 use crate::data::{Data, Group, Measurements, VelocitySet, numbered};
 use crate::field_path::{element_path, entry_path};
 use crate::limits;
+use crate::observables::Observable;
 use crate::origin::Origin;
 use crate::plausible::{self, short};
 use crate::quantile::quantile;
@@ -27,6 +28,8 @@ pub const VELOCITIES_MIN: usize = 2;
 const SUBJECTS_MIN: usize = 2;
 /// Accepted values of the instrument's own standard deviation.
 pub const REPEATABILITY: Interval = Interval::from(0.0, "m/s");
+/// Accepted values of the error that all decays have in common.
+pub const DECAY_ERROR: Interval = Interval::from_to(0.0, 100.0, "dB/cm");
 /// Accepted numbers of velocities behind given moments.
 pub const COUNT: WholeRange = WholeRange::new(VELOCITIES_MIN as u64, limits::DATA_COUNT_MAX);
 /// The forms in which `[data]` may be given.
@@ -60,6 +63,7 @@ pub(super) fn data_from(data: &Data, origin: Option<&Origin>, violations: &mut V
     all_subjects(data, origin, violations);
     observables(data, origin, violations);
     repeatability(data, origin, violations);
+    decay_error(data, violations);
 }
 
 fn moments(mean: f64, coefficient_of_variation: f64, violations: &mut Violations) {
@@ -119,6 +123,14 @@ fn no_subjects(set: &VelocitySet<'_>, subjects: &[u32], is_searched: bool) -> Op
              how much they differ"
         )
     })
+}
+
+/// Refuses an error of decays that there are not.
+fn decay_error(data: &Data, violations: &mut Violations) {
+    number("data.decay_error", data.decay_error, DECAY_ERROR, violations);
+    if data.decay_error != 0.0 && !data.observables()[Observable::Decay] {
+        violations.add("data.decay_error", "is an error of measured decays, and there are none");
+    }
 }
 
 /// Refuses a repeatability as large as the scatter of the data, of which it is a part.

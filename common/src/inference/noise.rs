@@ -6,6 +6,7 @@ use crate::moments::{
     ComparedMoments, Estimate, MOMENTS, MomentMatrix, MomentVector, Moments, ObservableEstimates,
     moment_vector,
 };
+use crate::observables::Observable;
 use crate::statistics;
 
 /// Quantile of the standard normal law at 0.975.
@@ -82,9 +83,19 @@ pub fn data_noise(data: &Data, set: usize) -> Option<DataNoise> {
     // Less work where nothing else is compared.
     let covariance = match velocities.observables.which().is_empty() {
         true => of_velocities(statistics::covariance_of_logarithms(&velocities)?),
-        false => statistics::covariance_of_moments(&velocities)?,
+        false => with_decay_error(statistics::covariance_of_moments(&velocities)?, data, set),
     };
     Some(DataNoise { covariance, freedom: velocities.independent_count() as u64 - 1 })
+}
+
+/// Returns a covariance with the error that all decays of the data have in common.
+fn with_decay_error(mut covariance: MomentMatrix, data: &Data, set: usize) -> MomentMatrix {
+    if let Some(mean) = data.compared(set).observables[Observable::Decay] {
+        let error = data.decay_error / mean;
+        let axis = 2 + Observable::Decay as usize;
+        covariance[axis][axis] += error * error;
+    }
+    covariance
 }
 
 /// Returns the noise that the moments of the velocities of set number `set` would have if these were

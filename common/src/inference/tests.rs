@@ -27,7 +27,7 @@ fn model(point: &Point) -> Moments {
 fn without_noise(mean: f64, coefficient_of_variation: f64) -> Data {
     let count = Some(1 << 60);
     let measurements = Measurements::Moments { mean, coefficient_of_variation, count };
-    Data { measurements, repeatability: 0.0 }
+    Data { measurements, repeatability: 0.0, decay_error: 0.0 }
 }
 
 fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecification {

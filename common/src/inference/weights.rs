@@ -245,7 +245,7 @@ mod tests {
             let mut observables = PerObservable::default();
             observables[Observable::Decay] = Some(decays);
             let measurements = Measurements::Velocities { velocities, subjects: None, observables };
-            Data { measurements, repeatability: 0.0 }
+            Data { measurements, repeatability: 0.0, decay_error: 0.0 }
         };
         let scattered = data((0..12).map(|k| 4.5 + f64::from(k * 7 % 12) / 10.0).collect());
         let weights = MomentWeights::of_data(&scattered, 0).unwrap();
@@ -256,6 +256,12 @@ mod tests {
         let decay = measured_observables(&scattered.set(0).unwrap())[Observable::Decay].unwrap();
         off.observables[Observable::Decay] = Some(decay.mean + decay.standard_error);
         assert!(weights.cost(&moments, &off) >= 1.0);
+        // An error that all decays have in common adds to the variance that the velocities leave.
+        let uncertain = Data { decay_error: 0.3, ..scattered.clone() };
+        let cost = |data: &Data| MomentWeights::of_data(data, 0).unwrap().cost(&moments, &off);
+        let (relative, change) = (0.3 / decay.mean, decay.standard_error / decay.mean);
+        let added = change * change * (1.0 / cost(&uncertain) - 1.0 / cost(&scattered));
+        assert!((added / (relative * relative) - 1.0).abs() < 1e-9, "{added}");
         assert_eq!(MomentWeights::of_data(&data(vec![4.5; 12]), 0), None);
         let following = (0..12).map(|k| 4.5 + 1e-3 * f64::from(k * k)).collect();
         assert_eq!(MomentWeights::of_data(&data(following), 0), None);

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use osteon_common::case::Setup;
 use osteon_common::check::{self, COUNT, DATA_FORMS};
 use osteon_common::data::numbered;
 use osteon_common::field_path::entry_path;
@@ -12,7 +13,7 @@ use osteon_common::observables::{Observable, PerObservable};
 use osteon_common::origin::Origin;
 use osteon_common::parameters::Parameter;
 
-use super::{csv_format, observables};
+use super::{csv_format, decays, observables};
 use crate::document::{Node, Value};
 use crate::reader::{Reader, Table};
 use crate::velocities::{self, CsvError, CsvFormat, Measured, NamedColumns};
@@ -132,8 +133,8 @@ const KEYS_OF_MOMENTS: [Key; 4] = [
 /// Returns the keys of `[data]`.
 pub(super) fn keys() -> Vec<Key> {
     let (columns, lists) = (observables::column_keys(), observables::list_keys());
-    let parts: [&[Key]; 5] = [&KEYS_OF_A_FILE, &columns, &KEYS_OF_GROUPS, &lists, &KEYS_OF_MOMENTS];
-    parts.concat()
+    let of_velocities: [&[Key]; 3] = [&KEYS_OF_A_FILE, &columns, &KEYS_OF_GROUPS];
+    [of_velocities.concat(), [&lists[..], &KEYS_OF_MOMENTS, &decays::KEYS].concat()].concat()
 }
 
 /// Largest number that names a subject.
@@ -145,11 +146,11 @@ const SUBJECT: WholeRange = WholeRange { min: 0, max: u32::MAX as u64 };
 pub(super) fn read(
     reader: &mut Reader,
     root: &Table<'_>,
-    directory: &Path,
+    (directory, setup): (&Path, &Setup),
     kind: JobKind,
 ) -> (Option<Data>, Option<Origin>) {
     let (mut origin, mut of_errors) = (None, None);
-    let mut data = given(reader, root, kind, |path, named, format| {
+    let mut data = given(reader, root, (kind, setup), |path, named, format| {
         let (measurements, repeatability, stands) =
             from_file(&directory.join(path), named, format)?;
         (origin, of_errors) = (Some(stands), repeatability);
@@ -166,7 +167,7 @@ pub(super) fn read(
 fn given(
     reader: &mut Reader,
     root: &Table<'_>,
-    kind: JobKind,
+    (kind, setup): (JobKind, &Setup),
     from_file: impl FnOnce(&str, &NamedColumns<'_>, &CsvFormat) -> Result<Measurements, Vec<CsvError>>,
 ) -> Option<Data> {
     let table = reader.table(root, "data", &keys().iter().map(|key| key.name).collect::<Vec<_>>());
@@ -205,7 +206,11 @@ fn given(
             "is the root mean square of the errors in `error_column`, too; leave one of them out";
         reader.violations.add(table.path("repeatability"), message);
     }
-    let data = measurements.map(|measurements| Data { measurements, repeatability });
+    let mut data =
+        measurements.map(|measurements| Data { measurements, repeatability, decay_error: 0.0 });
+    if let Some(data) = &mut data {
+        decays::apply(reader, &table, &setup.probe, data);
+    }
     if kind == JobKind::Identification {
         return data;
     }

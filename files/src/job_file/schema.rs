@@ -3,7 +3,7 @@
 use osteon_common::bone::Sublayers;
 use osteon_common::bone_structure::{BoneStructure, PorosityProfile};
 use osteon_common::case::Setup;
-use osteon_common::check::{COUNT, REPEATABILITY};
+use osteon_common::check::{COUNT, DECAY_ERROR, REPEATABILITY};
 use osteon_common::fields::{Choice, DeclaredKey, DeclaredValue, Edge, Interval, Key, entries};
 use osteon_common::job::{PosteriorSettings, PriorDistribution, RunSettings};
 use osteon_common::limits::SUBLAYERS_MAX;
@@ -12,6 +12,7 @@ use osteon_common::parameters::Parameter;
 use osteon_common::porosity::{self, POROSITY, PorosityModel};
 use osteon_common::pulse::{PulseForm, TONE_CYCLES};
 use osteon_common::pulse_samples::{SAMPLES, STEP};
+use osteon_common::spreading::ELEMENT_LENGTH;
 use serde_json::{Map, Value as Json, json};
 
 use crate::materials::Material;
@@ -20,7 +21,7 @@ use crate::{materials, pulse};
 use super::csv_format::{LINES, MISSING_MAX};
 use super::data_section::GROUP_COLUMNS_MAX;
 use super::observables;
-use super::{data_section, parameters, posterior, priors};
+use super::{data_section, decays, parameters, posterior, priors};
 use crate::velocities::{DecimalMark, Separator, VelocityUnit};
 
 /// Returns the JSON Schema (draft 2020-12) of a job file in TOML or JSON, with a final newline. It
@@ -250,8 +251,10 @@ fn data() -> Json {
         json!({ "type": "integer", "minimum": COUNT.min, "maximum": COUNT.max }),
         number(Some(0.0), REPEATABILITY),
     ];
+    let spreading = json!({ "anyOf": [{ "enum": decays::NAMES }, number(None, ELEMENT_LENGTH)] });
+    let of_decays = [spreading, number(None, DECAY_ERROR)];
     let types = of_a_file.into_iter().chain(Observable::ALL.map(|_| name())).chain(of_groups);
-    let types = types.chain(Observable::ALL.map(values)).chain(of_moments);
+    let types = types.chain(Observable::ALL.map(values)).chain(of_moments).chain(of_decays);
     let properties = data_section::keys().into_iter().zip(types);
     let properties = properties.map(|(key, schema)| (key.name.to_owned(), described(schema, key)));
     object(properties.collect::<Map<_, _>>().into())

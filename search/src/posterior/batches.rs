@@ -8,7 +8,8 @@ use osteon_common::parameters::Point;
 use super::check::{BatchCheck, Doubt};
 use super::features::features;
 use super::likelihood::SetLikelihood;
-use super::population::{Member, Population, PosteriorProblem, closed_form};
+use super::population::{Member, Population};
+use super::problem::{PosteriorProblem, closed_form, moments};
 use super::surrogate::{Scale, Surrogate};
 
 /// Sobol' points of the populations from which points to evaluate are drawn.
@@ -17,8 +18,16 @@ const SCOUTS: u64 = 2048;
 const BATCH: usize = 32;
 /// Further points of each batch, where draws matter that the interpolation knows least.
 const LEARNT: usize = 16;
-/// Largest number of batches of the prior.
-const EXPLORED_MAX: u64 = 2;
+/// A population of fewer points does not tell where the data are matched.
+const MEMBERS_MIN: usize = BATCH;
+/// Largest number of batches that look for points near the data, where the interpolation knows none.
+const EXPLORED_MAX: u64 = 8;
+/// Largest number of these, one after another, that come no nearer.
+const VAIN_MAX: u64 = 2;
+/// Distances of scouts from the nearest point, in units of those of points of the prior.
+const CLOSER: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+/// Number of the nearest scouts about which a population is drawn if points of the prior do not match.
+const NEAR: usize = 64;
 /// Limit of the expected square error of a draw, in units of the data's noise: beyond, one draw is as
 /// wrong as another.
 const ERROR_LIMIT: f64 = 9.0;
@@ -38,8 +47,12 @@ pub(crate) struct PosteriorSearch {
     pending: Vec<Pending>,
     pub(super) evaluations: u64,
     pub(super) populations: u64,
-    /// Number of batches of the prior.
+    /// Number of batches that look for points near the data.
     explored: u64,
+    /// That of their points which is nearest to the data, and its distance in units of the data's noise.
+    nearest: Option<(Point, f64)>,
+    /// Number of the last of these batches that came no nearer.
+    in_vain: u64,
     /// Whether no point matches the data, as far as is known.
     nothing_matches: bool,
     /// The evaluated draws of the last batch.
@@ -73,7 +86,7 @@ enum PointUse {
     /// The interpolation is uncertain there; with its interpolated moments, and the expected
     /// square error in units of the data's noise.
     Learn(MomentVector, f64),
-    /// It is a draw of the prior.
+    /// No point near the data is known, and this may be one.
     Explore,
 }
 
@@ -101,6 +114,8 @@ impl PosteriorSearch {
             evaluations: 0,
             populations: 0,
             explored: 0,
+            nearest: None,
+            in_vain: 0,
             nothing_matches: false,
             check: BatchCheck::default(),
         };
@@ -135,7 +150,14 @@ impl PosteriorSearch {
                 let squares = errors.map(|error| error * error);
                 self.check.learn(problem.in_noise(squares) / expected);
             }
-            (PointUse::Learn(..), None) | (PointUse::Explore, _) => {}
+            (PointUse::Explore, Some(values)) => {
+                let distance = problem.distance(&values);
+                if self.nearest.is_none_or(|(_, least)| distance < least) {
+                    self.nearest = Some((pending.point, distance));
+                    self.in_vain = 0;
+                }
+            }
+            (PointUse::Learn(..) | PointUse::Explore, None) => {}
         }
         if let Some(moments) = moments {
             self.learn(&pending.point, &moments);
@@ -188,22 +210,48 @@ impl PosteriorSearch {
         if passed || left == 0 {
             return;
         }
-        let mut population = problem.population(&self.surrogate, SCOUTS, number);
+        let population = self.population(number);
         self.nothing_matches = population.members.is_empty();
-        if self.nothing_matches {
-            let skipped = self.explored as usize * BATCH;
-            let enough = self.explored == EXPLORED_MAX;
-            let points = if enough { Vec::new() } else { problem.prior_points(SCOUTS) };
-            let points = points.into_iter().skip(skipped).take(BATCH.min(left));
-            self.pending =
-                points.map(|point| Pending { point, used_for: PointUse::Explore }).collect();
-            self.explored += 1;
-            return;
+        let pending = match population.members.len() < MEMBERS_MIN && self.goes_on_exploring() {
+            true => self.batch_to_explore(left),
+            false if self.nothing_matches => Vec::new(),
+            false => self.batch_to_check(population, left),
+        };
+        self.pending = pending.into_iter().rev().collect();
+    }
+
+    /// Draws population number `number`: about the scouts that are nearest to the data if points of the prior do not
+    /// match these.
+    fn population(&mut self, number: u64) -> Population {
+        let Some(problem) = &self.problem else { return Population::default() };
+        let population = problem.population(&self.surrogate, SCOUTS, number);
+        if population.members.len() >= MEMBERS_MIN || self.surrogate.len() == 0 {
+            return population;
         }
+        let scouts = self.scouts(problem);
+        let near: Vec<&Point> = scouts.iter().take(NEAR).collect();
+        let problem = problem.clone().drawn_near(&near);
+        let population = problem.population(&self.surrogate, SCOUTS, number);
+        self.problem = Some(problem);
+        population
+    }
+
+    /// Returns at most `most` points to look for the data.
+    fn batch_to_explore(&mut self, most: usize) -> Vec<Pending> {
+        let Some(problem) = &self.problem else { return Vec::new() };
+        let scouts = self.scouts(problem).into_iter().take(BATCH.min(most));
+        self.explored += 1;
+        self.in_vain += 1;
+        scouts.map(|point| Pending { point, used_for: PointUse::Explore }).collect()
+    }
+
+    /// Returns at most `most` points by which the interpolation is checked and bettered.
+    fn batch_to_check(&mut self, mut population: Population, most: usize) -> Vec<Pending> {
+        let Some(problem) = &self.problem else { return Vec::new() };
         if problem.is_of_few() {
             population = problem.widened(population);
         }
-        let draws = population.resampled(BATCH.min(left), 0.5);
+        let draws = population.resampled(BATCH.min(most), 0.5);
         let checking = draws.iter().map(|member| Pending {
             point: member.point,
             used_for: PointUse::Check(member.moments),
@@ -213,10 +261,36 @@ impl PosteriorSearch {
         if !problem.is_of_few() {
             let errors = self.expected_errors(problem, &population);
             self.check.expected = population.mean(&errors);
-            pending.extend(most_uncertain(&population, &errors, LEARNT.min(left - pending.len())));
+            pending.extend(most_uncertain(&population, &errors, LEARNT.min(most - pending.len())));
         }
-        pending.reverse();
-        self.pending = pending;
+        pending
+    }
+
+    /// Returns whether another batch may find points nearer to the data.
+    fn goes_on_exploring(&self) -> bool {
+        self.explored < EXPLORED_MAX && self.in_vain <= VAIN_MAX
+    }
+
+    /// Returns points that may be near the data: of the prior, and as soon as the model is known somewhere also about
+    /// the nearest point, those first that the interpolation believes to be nearest.
+    fn scouts(&self, problem: &PosteriorProblem) -> Vec<Point> {
+        let scouts = problem.prior_points(self.explored * SCOUTS..(self.explored + 1) * SCOUTS);
+        let Some((nearest, _)) = self.nearest.filter(|_| self.surrogate.len() > 0) else {
+            return scouts;
+        };
+        let closer = scouts.into_iter().enumerate().map(|(index, mut scout)| {
+            let part = CLOSER[index % CLOSER.len()];
+            let values = scout.0.iter_mut().zip(nearest.0);
+            values.for_each(|(value, near)| *value = near + part * (*value - near));
+            scout
+        });
+        let distance = |point: Point| {
+            let values = moments(&self.surrogate, &problem.structure, &point)?;
+            Some((problem.distance(&values), point))
+        };
+        let mut known: Vec<(f64, Point)> = closer.filter_map(distance).collect();
+        known.sort_by(|a, b| a.0.total_cmp(&b.0));
+        known.into_iter().map(|(_, point)| point).collect()
     }
 
     /// Returns the expected square error of the interpolation at each member, in units of the data's

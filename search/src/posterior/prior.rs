@@ -63,6 +63,19 @@ impl ParameterPrior {
         value.clamp(self.lower, self.upper)
     }
 
+    /// Returns the probability of the prior below a value within the bounds, of which
+    /// [`quantile`](Self::quantile) is the inverse.
+    pub(super) fn probability_below(&self, value: f64) -> f64 {
+        let [low, high] = self.below;
+        let below = match self.law {
+            PosteriorPrior::Uniform => return (value - self.lower) / (self.upper - self.lower),
+            _ if self.mirrored => normal_probability(-self.score(value)),
+            _ => normal_probability(self.score(value)),
+        };
+        let u = (below - low) / (high - low);
+        if self.mirrored { 1.0 - u } else { u }
+    }
+
     /// Returns the logarithm of the density at a value, up to a constant; `None` outside the
     /// bounds.
     pub(super) fn log_density(&self, value: f64) -> Option<f64> {
@@ -124,6 +137,7 @@ mod tests {
     #[test]
     fn quantiles_are_those_of_the_truncated_laws() {
         let uniform = prior(PosteriorPrior::Uniform);
+        assert_eq!(uniform.probability_below(1750.0), 0.5);
         assert_eq!((uniform.quantile(0.0), uniform.quantile(0.5)), (1500.0, 1750.0));
         let normal = prior(PosteriorPrior::Normal { center: 1700.0, spread: 20.0 });
         assert!((normal.quantile(0.5) - 1700.0).abs() < 1e-6);
@@ -168,6 +182,8 @@ mod tests {
         ] {
             let prior = prior(law);
             let density = |u: f64| 1e-4 / (prior.quantile(u + 5e-5) - prior.quantile(u - 5e-5));
+            let back = prior.probability_below(prior.quantile(0.3));
+            assert!((back - 0.3).abs() < 1e-9, "{law:?}: {back}");
             let log = |u: f64| prior.log_density(prior.quantile(u)).unwrap();
             let found = log(0.3) - log(0.8);
             assert!((found - libm::log(density(0.3) / density(0.8))).abs() < 1e-5, "{law:?}");

@@ -10,7 +10,8 @@ use osteon_common::posterior::{Posterior, PosteriorDraw, PosteriorSummary, QUANT
 use osteon_common::results::{BestPoint, Moments};
 
 use super::batches::{PosteriorSearch, SearchOutcome};
-use super::population::{Member, Population, PosteriorProblem, closed_form, moments as moments_of};
+use super::population::{Member, Population};
+use super::problem::{PosteriorProblem, closed_form, moments as moments_of};
 
 /// Sobol' points of the population that the result summarises, with up to two free parameters and
 /// with more. The former are so many that quantiles, too, are exact to a thousandth of a standard
@@ -40,7 +41,7 @@ impl PosteriorSearch {
         let effective = population.effective() * self.check.efficiency();
         let reason = self.reason(errors);
         let of_sampling = in_units_of_the_data(problem, errors).into_iter().map(|one| one * one);
-        let prior = problem.prior_points(PRIOR_POINTS);
+        let prior = problem.prior_points(0..PRIOR_POINTS);
         let of = |quantity: &dyn Fn(&Point) -> f64| summary(&population, &prior, quantity);
         let free: Vec<Parameter> = problem.priors.iter().map(|prior| prior.parameter).collect();
         let [mean, variation] = [0, 1].map(|axis| {

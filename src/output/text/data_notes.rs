@@ -9,6 +9,8 @@ use super::number::{VELOCITY_DIGITS, digits, significant};
 const LISTED_MAX: usize = 5;
 /// Step of rounding, in standard deviations of the velocities, from which it is stated.
 const COARSE: f64 = 0.1;
+/// Probability of a test below which its assumption is said to be wrong.
+const SIGNIFICANT: f64 = 0.05;
 
 /// Why few velocities have no intervals.
 pub(super) const TOO_FEW: &str =
@@ -54,9 +56,16 @@ fn kolmogorov(data: &Data) -> Option<String> {
     let test = data.kolmogorov.flatten()?;
     let (distance, p) = (digits(test.distance, 2), digits(test.p_value, 2));
     let numbers = glued(&format!("D = {distance}, p = {p}"));
+    let verdict = match test.p_value < SIGNIFICANT {
+        true => {
+            ": these velocities do not have the model's distribution, and the intervals are those of \
+             velocities that have it. Wrong velocities and groups of different bones make such data."
+        }
+        false => "",
+    };
     Some(format!(
         "Kolmogorov–Smirnov test, data vs model: {numbers} (allows for the model being \
-         fitted to these data)"
+         fitted to these data){verdict}"
     ))
 }
 
@@ -84,6 +93,19 @@ mod tests {
         let many = of(200).unwrap();
         assert!(many.starts_with("200 velocities are far"), "{many}");
         assert!(many.ends_with("(by 37) and 195 more (`data.outliers` in result.json)."), "{many}");
+    }
+
+    #[test]
+    fn another_distribution_than_the_models_is_told() {
+        let of = |p: f64| {
+            let data = format!(
+                r#"{{"mean": 3900.0, "coefficient_of_variation": 0.03,
+                    "kolmogorov": {{"distance": 0.1, "p_value": {p:?}}}}}"#
+            );
+            kolmogorov(&serde_json::from_str(&data).unwrap()).unwrap()
+        };
+        assert!(of(0.06).ends_with("fitted to these data)"), "{}", of(0.06));
+        assert!(of(0.003).contains("do not have the model's distribution"), "{}", of(0.003));
     }
 
     #[test]

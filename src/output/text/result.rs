@@ -123,7 +123,7 @@ fn identification(text: &mut String, found: &Identification, shown: &ShownResult
     if fit::fits(found, specification) {
         text.push_str(&fit::uniqueness(found, &point, specification));
         text.push_str(&identified::text(found, &specification.setup.structure));
-        text.push_str(&set_up::text(found, shown.usual_shifts));
+        text.push_str(&set_up::text(found, &specification.random, shown.usual_shifts));
     } else {
         text.push_str(&fit::misfit(found, &point, specification));
         let of_posterior = match fit::has_outliers(found) {

@@ -1,7 +1,9 @@
 //! What usual errors of the setup would move, as text.
 
+use osteon_common::random_quantities::RandomQuantities;
+use osteon_common::setup_quantity::SetupQuantity;
 use osteon_common::systematic::SystematicQuantity;
-use osteon_files::report::Identification;
+use osteon_files::report::{Data, Identification};
 
 use super::layout::{aligned, glued, wrapped};
 use super::number::digits;
@@ -9,10 +11,16 @@ use crate::usual_shifts::UsualShift;
 
 /// Largest number of quantities that are listed.
 const LISTED: usize = 5;
+/// Share of the velocities' variance from which it is worth a word.
+const SHARE_MIN: f64 = 0.05;
 
 /// Says that intervals hold for the setup as given, and what usual errors of it would move; empty without an
-/// interval of √(c1111/ρ).
-pub(super) fn text(found: &Identification, shifts: &[UsualShift]) -> String {
+/// interval of √(c1111/ρ). `random` is what differs between the realizations of the job.
+pub(super) fn text(
+    found: &Identification,
+    random: &RandomQuantities,
+    shifts: &[UsualShift],
+) -> String {
     let Some((value, half_width)) = bulk_velocity(found).filter(|_| !shifts.is_empty()) else {
         return String::new();
     };
@@ -28,8 +36,11 @@ pub(super) fn text(found: &Identification, shifts: &[UsualShift]) -> String {
         0 => "All".to_owned(),
         more => format!("With {more} smaller ones all"),
     };
+    let is_random = random.random().any(|one| one == SetupQuantity::ProbeTilt);
+    let tilt = shifts.iter().find(|one| one.quantity == SystematicQuantity::Tilt && !is_random);
+    let scatter = tilt.zip(found.data.as_ref()).and_then(|(tilt, data)| scatter(tilt, data));
     format!(
-        "\n{}{}{}",
+        "\n{}{}{}{}",
         wrapped(
             "These intervals hold for the setup as given. What usual errors of it would move \
              √(c1111/ρ) by, also in half widths of its interval:"
@@ -41,8 +52,35 @@ pub(super) fn text(found: &Identification, shifts: &[UsualShift]) -> String {
             in_widths(together),
             glued("`[systematic] usual = true`"),
             glued("`--no-budget`"),
-        ))
+        )),
+        scatter.map(|words| wrapped(&words)).unwrap_or_default()
     )
+}
+
+/// Says what the scatter of a usual tilt, anew in each measurement, would do to the dispersion.
+fn scatter(tilt: &UsualShift, data: &Data) -> Option<String> {
+    let ratio = tilt.change / data.moments.coefficient_of_variation?;
+    let share = ratio * ratio;
+    let effect = match share {
+        _ if share < SHARE_MIN => return None,
+        _ if share < 1.0 => format!(
+            "makes {} of the velocities' variance; the dispersion is then stated {} too large.",
+            percent(share),
+            percent(1.0 / (1.0 - share).sqrt() - 1.0)
+        ),
+        _ => "makes a larger variance than that of the velocities.".to_owned(),
+    };
+    let tilt = tilt.value - tilt.known.unwrap_or(0.0);
+    Some(format!(
+        "A hand that tilts the probe anew for each measurement, by {} (standard deviation), {effect} {} says it to \
+         the model; measurements in both directions take it out.",
+        glued(&format!("{}°", digits(tilt.to_degrees(), 2))),
+        glued("`[random.probe_tilt]`")
+    ))
+}
+
+fn percent(share: f64) -> String {
+    glued(&format!("{} %", digits(100.0 * share, 2)))
 }
 
 /// Returns √(c1111/ρ) and half the width of its interval, m/s.
@@ -78,4 +116,36 @@ fn possible(shift: &UsualShift) -> String {
     let shown = |value: f64| format!("{}{unit}", digits(value * scale, 3));
     let known = shift.known.map_or_else(|| "none".to_owned(), shown);
     format!("{} {} for {known}", shift.quantity.name().replace('_', " "), shown(shift.value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the text with blanks as a terminal shows them.
+    fn unglued(words: &str) -> String {
+        wrapped(words).split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    fn check(change: f64, expected: Option<&str>) {
+        let data =
+            serde_json::from_str(r#"{"mean": 4000.0, "coefficient_of_variation": 0.03}"#).unwrap();
+        let value = 0.5_f64.to_radians();
+        let tilt =
+            UsualShift { quantity: SystematicQuantity::Tilt, value, known: Some(0.0), change };
+        let words = scatter(&tilt, &data).map(|words| unglued(&words));
+        let begins =
+            words.as_deref().and_then(|words| words.split_once(" `[random")).map(|all| all.0);
+        assert_eq!(begins, expected, "{change}");
+    }
+
+    #[test]
+    fn a_tilt_that_scatters_as_much_as_the_velocities_is_told() {
+        const BY: &str = "A hand that tilts the probe anew for each measurement, by 0.50° (standard deviation), makes ";
+        check(0.006, None);
+        let part =
+            "36 % of the velocities' variance; the dispersion is then stated 25 % too large.";
+        check(0.018, Some(&format!("{BY}{part}")));
+        check(0.03, Some(&format!("{BY}a larger variance than that of the velocities.")));
+    }
 }

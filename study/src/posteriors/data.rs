@@ -89,7 +89,7 @@ fn in_series(velocities: &[f64], count: usize, generator: &mut Generator) -> Dat
     let observables = ObservedColumns::default();
     let measurements =
         Measurements::Velocities { velocities, subjects: Some(subjects), observables };
-    Data { measurements, repeatability: 0.0 }
+    Data { measurements, repeatability: 0.0, decay_error: 0.0 }
 }
 
 /// Returns the random factor that makes a normal number one of Student's law, with the variance 1.

@@ -83,7 +83,7 @@ fn halve_data(velocities: &[f64]) -> Data {
         coefficient_of_variation: moments.coefficient_of_variation,
         count: Some(velocities.len() as u64 / 2),
     };
-    Data { measurements, repeatability: 0.0 }
+    Data { measurements, repeatability: 0.0, decay_error: 0.0 }
 }
 
 /// Computes a posterior with this number of draws, or the default one.

@@ -27,7 +27,7 @@ fn job(free: &[Parameter]) -> JobSpecification {
         coefficient_of_variation: 0.0271,
         count: Some(COUNT),
     };
-    let data = Data { measurements, repeatability: 0.0 };
+    let data = Data { measurements, repeatability: 0.0, decay_error: 0.0 };
     let mut job = specification(data, model_germs(REALIZATIONS, 1));
     for parameter in Parameter::ALL.into_iter().filter(|one| !free.contains(one)) {
         job.parameters[parameter as usize] = Range::Fixed(OPTIMUM.get(parameter));

@@ -50,7 +50,7 @@ fn so_do_those_of_moments_whose_number_of_velocities_is_given() {
     let of_count = |velocities: &[f64], count: Option<u64>| {
         let Moments { mean, coefficient_of_variation } = moments(velocities).unwrap();
         let measurements = Measurements::Moments { mean, coefficient_of_variation, count };
-        intervals_of_moments(&Data { measurements, repeatability: 0.0 })
+        intervals_of_moments(&Data { measurements, repeatability: 0.0, decay_error: 0.0 })
     };
     let mut covered = [0; 2];
     for seed in 0..2000 {
@@ -230,7 +230,7 @@ fn moments_with_a_number_have_the_noise_of_a_normal_law() {
         let Moments { mean, coefficient_of_variation } = found;
         let count = Some(50);
         let measurements = Measurements::Moments { mean, coefficient_of_variation, count };
-        let data = Data { measurements, repeatability: 0.0 };
+        let data = Data { measurements, repeatability: 0.0, decay_error: 0.0 };
         assert_eq!(data_noise(&data, 0).map(|noise| noise.freedom), Some(49));
         for (held, holds) in held.iter_mut().zip(delta_method_holds(&data)) {
             *held += u64::from(holds);

@@ -61,7 +61,10 @@ fn job(free: &[Parameter], measurements: Measurements) -> JobSpecification {
             cost_tolerance: 1e-4,
             ..SearchSettings::by(SearchMethod::Simplex)
         },
-        ..specification(Data { measurements, repeatability: 0.0 }, SearchMethod::Simplex)
+        ..specification(
+            Data { measurements, repeatability: 0.0, decay_error: 0.0 },
+            SearchMethod::Simplex,
+        )
     }
 }
 

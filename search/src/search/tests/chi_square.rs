@@ -10,7 +10,7 @@ const REALIZATIONS: u32 = 20_000;
 /// The mean is known to 0.05 %, the coefficient of variation to 1.3 %.
 fn data(mean: f64, coefficient_of_variation: f64) -> Data {
     let measurements = Measurements::Moments { mean, coefficient_of_variation, count: Some(2958) };
-    Data { measurements, repeatability: 0.0 }
+    Data { measurements, repeatability: 0.0, decay_error: 0.0 }
 }
 
 /// Velocities whose mean is proportional to e_L, and whose coefficient of variation, a quarter of

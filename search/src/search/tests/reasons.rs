@@ -63,6 +63,7 @@ fn distances_are_in_standard_errors_where_these_are_known() {
             count: Some(count),
         },
         repeatability: 0.0,
+        decay_error: 0.0,
     };
     // The smallest mean within the bounds is 2644 m/s; one standard error is 0.3 %.
     for (mean, expected) in [(2640.0, Status::Converged), (2600.0, Status::NotMatched)] {

@@ -223,7 +223,7 @@ fn further_starts_end_within_a_tenth_of_a_standard_error() {
             let mut specification = by_newton(60);
             let measurements =
                 Measurements::Moments { mean: 3900.0, coefficient_of_variation: 0.03, count };
-            specification.data = Some(Data { measurements, repeatability: 0.0 });
+            specification.data = Some(Data { measurements, repeatability: 0.0, decay_error: 0.0 });
             specification.objective = objective;
             specification.parameters[0] =
                 Range::Free { start: 1600.0, lower: 1500.0, upper: 2000.0 };

@@ -96,7 +96,7 @@ fn a_posterior_is_drawn_beside_the_core() {
     let mut job = identification(4);
     let (mean, coefficient_of_variation) = (3901.5, 2.9e-4);
     let measurements = Measurements::Moments { mean, coefficient_of_variation, count: Some(1000) };
-    job.data = Some(Data { measurements, repeatability: 0.0 });
+    job.data = Some(Data { measurements, repeatability: 0.0, decay_error: 0.0 });
     job.search = Search::by(SearchMethod::Posterior);
     job.posterior = Some(PosteriorSettings::default());
     rig.accept(job);
