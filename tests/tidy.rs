@@ -64,7 +64,7 @@ fn crates_depend_on_each_other_along_the_allowed_arrows_only() {
         ("osteon-signals", "common files solver"),
         ("osteon-slurm", "client common proto transport"),
         ("osteon-solver", "common"),
-        ("osteon-study", "common local search solver"),
+        ("osteon-study", "common local search signals solver"),
         ("osteon-transport", "common files proto"),
         ("osteon-umbridge", "client common files http proto search solver transport"),
         ("osteon-worker", "common proto solver transport"),

@@ -147,6 +147,21 @@ impl SyntheticStudy {
         npy::of_samples(&self.shape, &self.samples)
     }
 
+    /// Returns the signals of a series, in steps of the recorder: of each source those of all receivers.
+    pub fn signals(&self, series: usize) -> Vec<Vec<Vec<f64>>> {
+        let [.., receivers, samples] = self.shape[..] else { return Vec::new() };
+        let each = self.shape[1..].iter().product();
+        let recorded = self.samples.chunks(each).nth(series).unwrap_or_default();
+        let receiver = |samples: &[i16]| samples.iter().copied().map(f64::from).collect();
+        let source = |signals: &[i16]| signals.chunks(samples).map(receiver).collect();
+        recorded.chunks(receivers * samples).map(source).collect()
+    }
+
+    /// Returns the model's velocity of each series.
+    pub fn truths(&self) -> &[Outcome] {
+        &self.truths
+    }
+
     /// Returns how the signals are recorded.
     pub fn description(&self) -> &ProbeDescription {
         &self.description

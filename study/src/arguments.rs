@@ -60,6 +60,10 @@ pub(crate) enum Study {
     /// Compare the standard deviations that `osteon design` predicts for five measurements with those of simulated
     /// studies
     Designs(TwinsArguments),
+    /// Compare velocities picked in noisy signals of tilted probes with those of the model
+    Picks(TwinsArguments),
+    /// Count how many confidence intervals of porosity and dispersion contain the true value, from signals
+    Signals(TwinsArguments),
     /// Identify one porosity from bones whose porosity changes through the thickness
     UnmodelledProfiles(TwinsArguments),
     /// Count how many intervals of posteriors contain the true value, over parameter sets drawn from

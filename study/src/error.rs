@@ -4,6 +4,7 @@ use std::convert::Infallible;
 
 use osteon_common::realization::PointError;
 use osteon_local::design::DesignError;
+use osteon_local::synthesis::SynthesisError;
 use osteon_search::IdentifyError;
 use thiserror::Error;
 
@@ -19,4 +20,7 @@ pub enum StudyError {
     /// There is no design.
     #[error(transparent)]
     Design(#[from] DesignError),
+    /// There are no signals.
+    #[error(transparent)]
+    Signals(#[from] SynthesisError),
 }

@@ -26,6 +26,7 @@ pub mod refinement;
 pub mod searches;
 pub mod setup_errors;
 pub mod setups;
+pub mod signals;
 mod spread;
 pub mod stacks;
 mod table;

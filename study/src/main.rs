@@ -19,7 +19,7 @@ use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, designs,
     digest, failures, methods, models, porosities, refinement, searches, setup_errors, setups,
-    stacks, variance,
+    signals, stacks, variance,
 };
 
 use crate::arguments::{
@@ -92,6 +92,10 @@ const SETUP_ERRORS: OverTwins = OverTwins {
 };
 const DESIGNS: OverTwins =
     OverTwins { name: "designs", repetitions: designs::STUDIES, table: designs::table };
+const PICKS: OverTwins =
+    OverTwins { name: "picks", repetitions: signals::MEASUREMENTS, table: signals::picks };
+const SIGNALS: OverTwins =
+    OverTwins { name: "signals", repetitions: signals::STUDIES, table: signals::studies };
 const UNMODELLED_PROFILES: OverTwins =
     OverTwins { name: "unmodelled-profiles", repetitions: 1, table: porosities::unmodelled };
 
@@ -144,6 +148,8 @@ fn run_study(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::PorosityProfiles(arguments) => run_over_twins(&POROSITY_PROFILES, arguments, isa),
         Study::SetupErrors(arguments) => run_over_twins(&SETUP_ERRORS, arguments, isa),
         Study::Designs(arguments) => run_over_twins(&DESIGNS, arguments, isa),
+        Study::Picks(arguments) => run_over_twins(&PICKS, arguments, isa),
+        Study::Signals(arguments) => run_over_twins(&SIGNALS, arguments, isa),
         Study::UnmodelledProfiles(arguments) => {
             run_over_twins(&UNMODELLED_PROFILES, arguments, isa)
         }

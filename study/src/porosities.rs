@@ -34,8 +34,8 @@ const PROFILE_VELOCITIES: u64 = 100;
 /// Number of velocities of the data of [`unmodelled`].
 const UNMODELLED_VELOCITIES: u64 = 4000;
 /// Intervals from which the true porosity and the true dispersion are drawn.
-const POROSITIES: [f64; 2] = [0.03, 0.25];
-const DISPERSIONS: [f64; 2] = [0.05, 0.2];
+pub(crate) const POROSITIES: [f64; 2] = [0.03, 0.25];
+pub(crate) const DISPERSIONS: [f64; 2] = [0.05, 0.2];
 /// Bounds of their search.
 const POROSITY_BOUNDS: [f64; 2] = [0.002, 0.45];
 const DISPERSION_BOUNDS: [f64; 2] = [0.01, 0.4];
@@ -167,7 +167,7 @@ pub fn unmodelled(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTa
             let uniform =
                 velocities(BoneStructure { porosity: Some(mean), ..BoneStructure::default() })?;
             let shift = mean_of(&profiled) - mean_of(&uniform);
-            let found = identify_pores(&setup, profiled, twins)?;
+            let found = identify_pores(&setup, Data::from_velocities(profiled), twins)?;
             let value =
                 |k: usize| found.map_or("–".to_owned(), |found| format!("{:.3}", found[k].value));
             table.push(vec![
@@ -187,7 +187,7 @@ pub fn unmodelled(twins: &Twins, progress: RowCallback<'_>) -> Result<MarkdownTa
 
 /// How often intervals of one quantity hold its truth.
 #[derive(Debug, Clone, Copy, Default)]
-struct IntervalCount {
+pub(crate) struct IntervalCount {
     all: u64,
     without: u64,
     held: u64,
@@ -195,10 +195,10 @@ struct IntervalCount {
 }
 
 /// A quantity that was identified, and its truth.
-type Found = (Option<DerivedQuantity>, f64);
+pub(crate) type Found = (Option<DerivedQuantity>, f64);
 
 impl IntervalCount {
-    fn add(&mut self, (found, truth): &Found) {
+    pub(crate) fn add(&mut self, (found, truth): &Found) {
         let known = found.as_ref().and_then(|found| found.known.zip(errors(found, *truth)));
         let Some((Uncertainty { interval: [lower, upper], .. }, errors)) = known else {
             self.without += 1;
@@ -209,7 +209,7 @@ impl IntervalCount {
         self.squares = errors.mul_add(errors, self.squares);
     }
 
-    fn cells(&self) -> Vec<String> {
+    pub(crate) fn cells(&self) -> Vec<String> {
         let all = self.all.max(1) as f64;
         let share = format!("{:.1}", 100.0 * self.held as f64 / all);
         let spread = two_digits(Some((self.squares / all).sqrt()));
@@ -237,7 +237,11 @@ fn identify_bone(
     }
     let mut found = [[(None, 0.0); 2]; COVERAGE_VELOCITIES.len()];
     for (found, count) in found.iter_mut().zip(COVERAGE_VELOCITIES) {
-        let identified = identify_pores(&Setup::default(), velocities[..count].to_vec(), twins)?;
+        let identified = identify_pores(
+            &Setup::default(),
+            Data::from_velocities(velocities[..count].to_vec()),
+            twins,
+        )?;
         *found = [0, 1].map(|k| (identified.map(|identified| identified[k]), truth[k]));
     }
     Ok(Some(found))
@@ -245,12 +249,12 @@ fn identify_bone(
 
 /// Identifies porosity and dispersion by Newton's method, starting in the middle of the truths. `None` if
 /// there are no derivatives at the end.
-fn identify_pores(
+pub(crate) fn identify_pores(
     setup: &Setup,
-    velocities: Vec<f64>,
+    data: Data,
     twins: &Twins,
 ) -> Result<Option<[DerivedQuantity; 2]>, StudyError> {
-    let mut specification = specification(setup, velocities, REALIZATIONS, twins.seed);
+    let mut specification = specification(setup, data, REALIZATIONS, twins.seed);
     let start = middle(POROSITIES);
     specification.setup.structure.porosity = Some(start);
     specification.parameters[Parameter::Porosity as usize] = free(POROSITY_BOUNDS, start);
@@ -281,7 +285,12 @@ fn posterior_of_bone(twins: &Twins, number: u64) -> Result<Option<(Point, Poster
     }
     velocities.truncate(PROFILE_VELOCITIES as usize);
     let model_seed = twins.seed + number;
-    let mut job = specification(&bones.setup, velocities, POSTERIOR_REALIZATIONS, model_seed);
+    let mut job = specification(
+        &bones.setup,
+        Data::from_velocities(velocities),
+        POSTERIOR_REALIZATIONS,
+        model_seed,
+    );
     let ends = [Parameter::SurfacePorosity, Parameter::MarrowPorosity];
     for (parameter, bounds) in ends.into_iter().zip(ENDS) {
         job.parameters[parameter as usize] = free(bounds, middle(bounds));
@@ -317,9 +326,9 @@ fn holds(posterior: &Posterior, value: Quantity, level: f64, truth: f64) -> bool
 
 /// Returns a job in which the dispersion is free, and everything else fixed at the truth: callers free the
 /// porosities.
-fn specification(
+pub(crate) fn specification(
     setup: &Setup,
-    velocities: Vec<f64>,
+    data: Data,
     realizations: u64,
     seed: u64,
 ) -> JobSpecification {
@@ -329,7 +338,7 @@ fn specification(
     JobSpecification {
         kind: JobKind::Identification,
         setup: setup.clone(),
-        data: Some(Data::from_velocities(velocities)),
+        data: Some(data),
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
@@ -348,7 +357,7 @@ fn specification(
 }
 
 /// Returns the point of the default matrix, the bone between the pores, with this dispersion.
-fn matrix_point(dispersion: f64) -> Point {
+pub(crate) fn matrix_point(dispersion: f64) -> Point {
     Point::of_matrix(&BoneMatrix::default(), dispersion)
 }
 
