@@ -12,6 +12,7 @@ import platform
 import re
 import shutil
 import sys
+import time
 import zipfile
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -46,19 +47,29 @@ def main():
         build(python, work, processor, arguments.profile, variables)
 
 
+def target_of(processor):
+    """What rustc calls Linux on a processor."""
+    return f"{processor}-unknown-linux-gnu"
+
+
+def program(work, processor, profile):
+    """Where the program for a processor is built."""
+    folder = "debug" if profile == "dev" else profile
+    return work / "target" / target_of(processor) / folder / "osteon"
+
+
 def build(python, work, processor, profile, variables):
     """Builds one wheel, and says what it is."""
-    target = f"{processor}-unknown-linux-gnu"
+    target = target_of(processor)
     run(["rustup", "target", "add", target], ROOT)
-    # The linker leaves out what only a debugger needs.
-    strip = {f"CARGO_PROFILE_{profile.upper()}_STRIP": "symbols"}
-    variables = variables | strip | {"CARGO_TARGET_DIR": str(work / "target")}
+    # Without what only a debugger needs.
+    lean = {f"CARGO_PROFILE_{profile.upper()}_{key}": value for key, value in (("DEBUG", "false"), ("STRIP", "symbols"))}
+    variables = variables | lean | {"CARGO_TARGET_DIR": str(work / "target")}
     zigbuild = ["cargo-zigbuild", "zigbuild", "--locked", "--package", "osteon", "--bin", "osteon"]
     run([*zigbuild, "--profile", profile, "--target", f"{target}.{GLIBC}"], ROOT, variables)
-    folder = "debug" if profile == "dev" else profile
     shutil.rmtree(SCRIPTS, ignore_errors=True)
     SCRIPTS.mkdir(parents=True)
-    shutil.copy2(work / "target" / target / folder / "osteon", SCRIPTS / "osteon")
+    shutil.copy2(program(work, processor, profile), SCRIPTS / "osteon")
     wheels = work / "wheels"
     shutil.rmtree(wheels / processor, ignore_errors=True)
     wheel = [python, "-m", "maturin", "build", "--zig", "--locked", "--profile", profile]
@@ -84,9 +95,18 @@ def check(wheel, processor, trial):
     shutil.rmtree(trial, ignore_errors=True)
     run([sys.executable, "-m", "venv", trial])
     run([trial / "bin" / "python", "-m", "pip", "install", "--quiet", wheel])
-    run([trial / "bin" / "osteon", "--version"])
+    demonstrate(trial / "bin" / "osteon", trial)
     use = "import osteon, sys; print(osteon.simulate(sys.argv[1]).velocity, 'm/s')"
     run([trial / "bin" / "python", "-c", use, ROOT / "examples" / "cases" / "A.toml"])
+
+
+def demonstrate(osteon, folder):
+    """Runs the program's demonstration, which must end with a report."""
+    start = time.monotonic()
+    run([osteon, "demo", "demo"], folder)
+    if not list((folder / "demo").rglob("*.html")):
+        sys.exit(f"{osteon} demo wrote no report")
+    print(f"{osteon} demo: {time.monotonic() - start:.1f} s")
 
 
 def examine(name, content, processor):

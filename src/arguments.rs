@@ -313,6 +313,10 @@ pub(crate) struct InitArguments {
     /// New job file, or - to print it [default: the CSV file's name with .toml, or job.toml]
     #[arg(long, short = 'o', value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
+    /// Also write job.schema.json beside the job file, unless it is there, and name it in the job file's first line,
+    /// so that editors complete and check the keys
+    #[arg(long)]
+    pub(crate) schema: bool,
 }
 
 /// Longest span that a command line may ask for, s: a year.

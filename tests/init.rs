@@ -68,3 +68,22 @@ fn what_cannot_be_run_yet_is_said_at_once() {
     assert_eq!(nothing.code, Some(2));
     assert!(!scratch.path("w.toml").exists());
 }
+
+#[test]
+fn a_schema_for_editors_is_written_once_for_all_jobs_beside_it() {
+    let scratch = Scratch::new();
+    let csv = scratch.write("v.csv", "velocity\n3900\n3950\n3920\n");
+    let schema = scratch.path("job.schema.json");
+    for name in ["first.toml", "second.toml"] {
+        let job = scratch.path(name);
+        let said = run(&["init", text(&csv), "--schema", "-o", text(&job)]);
+        assert_eq!(said.code, Some(0), "{}", said.stderr);
+        let written = fs::read_to_string(&job).unwrap();
+        assert!(written.starts_with("#:schema job.schema.json\n# Identifies"), "{written}");
+        assert_eq!(run(&["check", text(&job)]).code, Some(0));
+        assert_eq!(fs::read_to_string(&schema).unwrap(), run(&["schema", "job"]).stdout);
+    }
+    let printed = run(&["init", text(&csv), "--schema", "-o", "-"]);
+    assert_eq!(printed.code, Some(2));
+    assert!(printed.stderr.contains("-o must name one"), "{}", printed.stderr);
+}

@@ -355,6 +355,43 @@ fn nothing_is_left_over() {
     }
 }
 
+/// Cargo.toml has the version; other files are compared where their contents are tested.
+#[test]
+fn what_names_a_version_or_its_year_names_this_one() {
+    let read = |name: &str| fs::read_to_string(root().join(name)).unwrap();
+    let places = [
+        ("deploy/conda/recipe.yaml", "\n  version: \""),
+        ("deploy/docker/Dockerfile", "osteon:"),
+        ("deploy/kubernetes/osteon/Chart.yaml", "\nversion: "),
+        ("docs/deploy.md", "osteon:"),
+        ("docs/deploy.md", "version       "),
+        ("docs/deploy.md", "osteon_"),
+    ];
+    for (name, before) in places {
+        let text = read(name);
+        let starts = text.split(before).skip(1);
+        let named = starts
+            .map(|rest| rest.split(|c: char| !c.is_ascii_digit() && c != '.').next().unwrap())
+            .filter(|version| !version.is_empty());
+        let named: BTreeSet<_> = named.collect();
+        assert_eq!(named, BTreeSet::from([env!("CARGO_PKG_VERSION")]), "{name}: {before}");
+    }
+    let bibliography = read("src/commands/cite/references.bib");
+    let (_, rest) = bibliography.split_once("@misc{osteon,").unwrap();
+    let (_, year) = rest.split_once("year = {").unwrap();
+    let year = &year[..4];
+    assert!(read("Cargo.toml").contains(&format!("copyright = \"{year},")), "{year}");
+    for (name, before) in
+        [("CITATION.cff", "date-released: "), ("codemeta.json", "datePublished\": ")]
+    {
+        let text = read(name);
+        // Only a release has a date.
+        if let Some((_, date)) = text.split_once(before) {
+            assert!(date.trim_start_matches('"').starts_with(year), "{name}: {date}");
+        }
+    }
+}
+
 #[test]
 fn links_in_the_documentation_lead_somewhere() {
     let mut count = 0;

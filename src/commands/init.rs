@@ -20,15 +20,23 @@ use crate::resolved::OutputFormat;
 /// Job file without data, if no path is given.
 const UNNAMED: &str = "job.toml";
 
+/// The schema of job files, beside them.
+const SCHEMA: &str = "job.schema.json";
+
 /// Writes the job file, says what was understood, and whether the job can be run as it is.
 pub(super) fn write(arguments: &InitArguments) -> Ended {
-    let InitArguments { velocities, out } = arguments;
+    let InitArguments { velocities, out, schema } = arguments;
     let is_printed = out.as_deref() == Some(Path::new("-"));
     let path = match (out, velocities) {
         (Some(path), _) => path.clone(),
         (None, Some(csv)) => csv.with_extension("toml"),
         (None, None) => PathBuf::from(UNNAMED),
     };
+    if is_printed && *schema {
+        return Err(CommandFailure::bad_input(anyhow!(
+            "--schema writes a file beside the job file, so -o must name one, and not -"
+        )));
+    }
     if !is_printed {
         new_files::refuse_existing(&path)?;
     }
@@ -59,8 +67,7 @@ pub(super) fn write(arguments: &InitArguments) -> Ended {
         stdout.verbatim(&first.text).map_err(stdout_failure)?;
         return Ok(ExitStatus::Done);
     }
-    let content = first.text.into_bytes().into();
-    new_files::create(&[NewFile { path: path.clone(), content, secret: false }])?;
+    create(&path, first.text, *schema)?;
     let mut said = account.unwrap_or_default();
     let shown = visible::path(&path);
     said += &format!("wrote {shown}; next:\n");
@@ -68,6 +75,22 @@ pub(super) fn write(arguments: &InitArguments) -> Ended {
     said += &format!("  osteon check {shown}\n  osteon identify {shown}\n");
     stdout.verbatim(&said).map_err(stdout_failure)?;
     Ok(ExitStatus::Done)
+}
+
+/// Writes the job file, with the schema beside it if that is asked for.
+fn create(path: &Path, mut text: String, schema: bool) -> Result<(), CommandFailure> {
+    let beside = path.with_file_name(SCHEMA);
+    if schema {
+        text.insert_str(0, &format!("#:schema {SCHEMA}\n"));
+    }
+    let mut files =
+        vec![NewFile { path: path.to_owned(), content: text.into_bytes().into(), secret: false }];
+    // One serves all jobs of a directory.
+    if schema && !beside.exists() {
+        let content = job_file::schema().into_bytes().into();
+        files.push(NewFile { path: beside, content, secret: false });
+    }
+    new_files::create(&files)
 }
 
 /// Returns what was understood of a file of velocities, a sentence in each line after that with its name.

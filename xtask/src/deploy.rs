@@ -3,6 +3,7 @@
 
 use std::env;
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::{Context as _, Result};
@@ -18,8 +19,7 @@ const CARGO_DEB: &str = "3.8.0";
 /// `python3`, or the interpreter named by the variable `PYTHON`.
 pub(crate) fn check(words: &[String]) -> Result<()> {
     cargo(&mut cargo_command(&["build", "--bin", "osteon"]))?;
-    // Without optimisation it builds in a third of the time, and one package is made soon enough.
-    let cargo_deb = install("cargo-deb", CARGO_DEB, &["--debug", "--no-default-features"])?;
+    let cargo_deb = cargo_deb()?;
     let programs = programs()?;
     let python = env::var_os("PYTHON").unwrap_or_else(|| OsString::from("python3"));
     let mut command = Command::new(python);
@@ -31,4 +31,10 @@ pub(crate) fn check(words: &[String]) -> Result<()> {
         "the checks of deploy/ need Python 3.10 or later with its module venv (on Debian the \
          packages python3 and python3-venv), and the packages of deploy/requirements.txt",
     )
+}
+
+/// Installs the program that builds Debian packages, and returns its path.
+pub(crate) fn cargo_deb() -> Result<PathBuf> {
+    // Without optimisation it builds in a third of the time, and one package is made soon enough.
+    install("cargo-deb", CARGO_DEB, &["--debug", "--no-default-features"])
 }

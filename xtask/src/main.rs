@@ -16,6 +16,7 @@ mod process;
 mod python;
 mod random;
 mod reference;
+mod release;
 mod report;
 mod slurm;
 mod tables;
@@ -88,7 +89,7 @@ const BENCH: &[Cargo] = &[
 const VERBS: &[Verb] = &[
     Verb {
         name: "ci",
-        what: "what CI runs: lint, test and docs with the parts marked *",
+        what: "what CI runs: lint, test and what is marked *",
         action: Some(Action::Function(ci)),
         parts: &[],
     },
@@ -159,6 +160,12 @@ const VERBS: &[Verb] = &[
                 Action::Function(python::wheels),
             ),
         ],
+    },
+    Verb {
+        name: "release",
+        what: "* all files of a release, tried: wheels, archives, .deb, SBOM, sums; --help lists the options",
+        action: Some(Action::Function(release::make)),
+        parts: &[],
     },
 ];
 
@@ -261,6 +268,7 @@ const CI: &[&[&str]] = &[
     &["test", "umbridge"],
     &["test", "deploy"],
     &["test", "slurm", slurm::IF_INSTALLED],
+    release::TRIAL,
 ];
 
 fn main() -> ExitCode {

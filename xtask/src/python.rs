@@ -16,6 +16,9 @@ const NEEDS: &str = "the tests in Python need Python 3.10 or later (notebooks an
                      venv (on Debian the packages python3 and python3-venv), and the packages of their \
                      requirements.txt";
 
+/// Where wheels are built, below the target directory.
+pub(crate) const WHEELS: &str = "python-wheels";
+
 /// Runs the tests of both, or those that `words` name. Uses `python3`, or the interpreter named by the
 /// variable `PYTHON`; fails if there is none.
 pub(crate) fn test(words: &[String]) -> Result<()> {
@@ -57,7 +60,7 @@ pub(crate) fn bench(words: &[String]) -> Result<()> {
 /// `words` name.
 pub(crate) fn wheels(words: &[String]) -> Result<()> {
     let mut command = python("python/wheels.py");
-    command.arg("--work").arg(programs()?.with_file_name("python-wheels")).args(words);
+    command.arg("--work").arg(programs()?.with_file_name(WHEELS)).args(words);
     cargo(&mut command).context(NEEDS)
 }
 

@@ -13,6 +13,7 @@ use osteon_common::porosity::{self, POROSITY, PorosityModel};
 use osteon_common::pulse::{PulseForm, TONE_CYCLES};
 use osteon_common::pulse_samples::{SAMPLES, STEP};
 use osteon_common::spreading::ELEMENT_LENGTH;
+use osteon_common::version::VERSION;
 use serde_json::{Map, Value as Json, json};
 
 use crate::materials::Material;
@@ -50,6 +51,8 @@ pub fn schema() -> String {
     properties[key.name]["properties"]["priors"]["properties"] = each_parameter(posterior_prior);
     let schema = json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
+        // A name by which tools keep the schemas of versions apart; nothing is at this address.
+        "$id": format!("https://osteon.invalid/{VERSION}/job.schema.json"),
         "title": "Job file of osteon",
         "description": "Units are SI: m, s, kg/m³, Pa, Hz.",
         "type": "object",
