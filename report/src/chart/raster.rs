@@ -3,7 +3,7 @@
 use std::fmt::{self, Write as _};
 
 use super::Raster;
-use super::draw::{Frame, coordinate};
+use super::frame::{Frame, coordinate};
 
 /// Number of shades, of which the first is not drawn.
 const SHADES: usize = 16;
@@ -69,6 +69,8 @@ fn shade_of(value: f64) -> usize {
     ((value * SHADES as f64) as usize).min(SHADES - 1)
 }
 
+/// Returns the opacity of a shade, by the square of its value: what matters is near 1.
 fn opacity(shade: usize) -> String {
-    format!("{:.2}", shade as f64 / (SHADES - 1) as f64)
+    let value = shade as f64 / (SHADES - 1) as f64;
+    format!("{:.3}", value * value)
 }

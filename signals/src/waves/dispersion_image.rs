@@ -13,10 +13,10 @@ use crate::array_signals::SignalSeries;
 
 /// Frequencies and wavenumbers of the usual grid.
 const FREQUENCIES: u32 = 120;
-const WAVENUMBERS: u32 = 160;
+const WAVENUMBERS: u32 = 200;
 /// It ends at this many centre frequencies, and at the wavenumber of this phase velocity there, m/s.
 const HIGHEST: f64 = 2.0;
-const SLOWEST: f64 = 900.0;
+const SLOWEST: f64 = 1200.0;
 /// Smallest signal at a frequency, relative to the largest at any, of which an image shows the waves.
 const SMALLEST: f64 = 1e-3;
 
