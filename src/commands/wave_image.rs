@@ -6,7 +6,7 @@ use osteon_files::probe_file::ProbeDescription;
 use osteon_local::modes::{BandModes, BandModesError, BoneSurroundings};
 use osteon_local::source_traces::source_traces;
 use osteon_signals::{ArraySignals, DispersionImage, SignalSeries, WavePick};
-use osteon_solver::{Isa, ModesError};
+use osteon_solver::{Isa, ModesError, TraceError};
 
 use crate::exit_status::CommandFailure;
 use crate::wings::wave_image_figure;
@@ -40,8 +40,8 @@ pub(super) fn recorded(
         let receivers = source_traces(case, (transmitter, offset), (duration, step), isa)?;
         Ok(ArraySignals { transmitter, offset, start: 0.0, step, receivers })
     };
-    let directions = sources.iter().map(of_source).collect::<Result<Vec<_>, _>>();
-    let directions = directions.map_err(CommandFailure::bad_input::<osteon_solver::TraceError>)?;
+    let directions: Result<Vec<_>, TraceError> = sources.iter().map(of_source).collect();
+    let directions = directions.map_err(CommandFailure::bad_input)?;
     let (transmitters, transmitter_offsets) = sources.into_iter().unzip();
     let signals = SignalLayout { transmitters, transmitter_offsets, ..SignalLayout::default() };
     let setup = case.setup.clone();
