@@ -325,10 +325,20 @@ pub(crate) const SECONDS_MAX: f64 = 366.0 * 86_400.0;
 /// Longest age that a command line may ask for, s: a century.
 const AGE_S_MAX: f64 = 100.0 * SECONDS_MAX;
 
+/// Longest distance that a command line may ask for, m.
+const LENGTH_MAX: f64 = 1.0;
+
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
         _ => Err("it must be a number above 0 (s)".to_owned()),
+    }
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number <= LENGTH_MAX => Ok(number),
+        _ => Err(format!("it must be a number above 0 and at most {LENGTH_MAX} (m)")),
     }
 }
 

@@ -21,6 +21,7 @@ mod schema;
 mod simulate;
 mod synthesize;
 mod token;
+mod wave_image;
 mod worker;
 
 use crate::arguments::{Arguments, Command, Noun};
@@ -50,9 +51,10 @@ fn prepare_command(
             "no results were saved",
             simulate::simulate(arguments, isa()?),
         ),
-        Command::Pick(arguments) => {
-            PreparedCommand::interruptible("no file was written", pick::pick(arguments))
-        }
+        Command::Pick(arguments) => PreparedCommand::interruptible(
+            "no file was written",
+            pick::pick(arguments, isa()?, context.cores),
+        ),
         Command::Modes(arguments) => PreparedCommand::interruptible(
             "no files were written",
             modes::modes(arguments, isa()?, context.cores),

@@ -24,11 +24,11 @@ mod without;
 #[cfg(feature = "live")]
 pub(crate) use self::live::{PageOptions, RunPageOption};
 #[cfg(feature = "report")]
-pub(crate) use self::report::{ReportOption, dispersion_figure};
+pub(crate) use self::report::{ReportOption, dispersion_figure, wave_image_figure};
 #[cfg(not(feature = "live"))]
 pub(crate) use self::without::{PageOptions, RunPageOption};
 #[cfg(not(feature = "report"))]
-pub(crate) use self::without::{ReportOption, dispersion_figure};
+pub(crate) use self::without::{ReportOption, dispersion_figure, wave_image_figure};
 
 /// Commands about a job and its results.
 #[derive(Debug, Subcommand)]

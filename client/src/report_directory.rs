@@ -18,7 +18,7 @@ use crate::results_directory::{
 use crate::run_error::RunError;
 use crate::simulation_directory::TRACES;
 
-pub use osteon_report::dispersion_figure;
+pub use osteon_report::{dispersion_figure, wave_image_figure};
 
 /// Folder of a report within a directory of results.
 pub const REPORT: &str = "report";

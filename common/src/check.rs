@@ -20,6 +20,7 @@ mod setup_parameters;
 mod signals;
 mod systematic;
 mod value;
+mod waves;
 
 use crate::job::JobSpecification;
 use crate::violations::Violations;
@@ -35,6 +36,7 @@ pub use self::random_quantities::random_quantities;
 pub use self::setup::setup;
 pub use self::signals::signals;
 pub use self::value::{number, quantity};
+pub use self::waves::waves;
 
 impl JobSpecification {
     /// Returns all violations of the specification, each with its field named as in a job file.

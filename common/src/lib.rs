@@ -72,3 +72,4 @@ pub mod version;
 pub mod violations;
 pub mod visible;
 pub mod warnings;
+pub mod wave_settings;

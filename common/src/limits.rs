@@ -132,6 +132,8 @@ pub const READER_STALL_SECONDS_MAX: u64 = 30;
 pub const PRIORITY_MAX: u32 = 9;
 /// Maximum number of axes of an array of signals: series, transmitter, receiver, time.
 pub const SIGNAL_AXES_MAX: usize = 4;
+/// Maximum number of sources of a probe's signals.
+pub const TRANSMITTERS_MAX: usize = 64;
 /// Maximum number of samples of all signals of one file, which takes 512 MB.
 pub const SIGNAL_SAMPLES_MAX: u64 = 1 << 26;
 /// Maximum number of samples of one signal.

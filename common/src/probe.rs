@@ -140,6 +140,18 @@ impl Probe {
     }
 }
 
+impl Probe {
+    /// Returns the probe with its source moved by `offset`, m, away from the receivers, which stay where they are.
+    pub fn with_source_farther(&self, offset: f64) -> Self {
+        // A tilt turns the probe about its source, so that heights are those at another source.
+        let drop = offset * libm::sin(self.tilt);
+        let away = if self.receivers.first_x1 < self.source.x1 { offset } else { -offset };
+        let source = Source { x1: self.source.x1 + away, x3: self.source.x3 - drop };
+        let receivers = Receivers { x3: self.receivers.x3 - drop, ..self.receivers };
+        Self { source, receivers, ..self.clone() }
+    }
+}
+
 impl Default for Probe {
     /// A 1 MHz probe with 14 receivers 0.8 mm apart, 11 to 21.4 mm from the source, all 2 mm
     /// above the bone.

@@ -2,6 +2,7 @@
 
 use crate::accepted::Interval;
 use crate::fields::{self, Fields, Key, Number, Section};
+use crate::limits::TRANSMITTERS_MAX;
 use crate::plausible::TIME_STEP;
 
 fields::choices!(SignalAxis, TimeUnit, Transmitter, SignalUnit);
@@ -147,6 +148,8 @@ pub struct SignalLayout {
     pub band: Vec<f64>,
     /// The source of each element of the axis of transmitters, and of signals without that axis.
     pub transmitters: Vec<Transmitter>,
+    /// How much farther from the receivers than that source each of them is, m; empty: none is.
+    pub transmitter_offsets: Vec<f64>,
 }
 
 impl SignalLayout {
@@ -168,6 +171,12 @@ impl SignalLayout {
         meaning: "the source of each element of the axis of transmitters: `\"first\"` is that of \
                   `[probe.source]`, `\"second\"` the one beyond the last receiver",
     };
+
+    /// Returns the sources of the axis of transmitters, each with how much farther it is from the receivers, m.
+    pub fn sources(&self) -> impl Iterator<Item = (Transmitter, f64)> + '_ {
+        let offsets = self.transmitter_offsets.iter().copied().chain(std::iter::repeat(0.0));
+        self.transmitters.iter().copied().zip(offsets)
+    }
 }
 
 impl Default for SignalLayout {
@@ -182,6 +191,7 @@ impl Default for SignalLayout {
             full_scale: None,
             band: Vec::new(),
             transmitters: vec![Transmitter::First],
+            transmitter_offsets: Vec::new(),
         }
     }
 }
@@ -217,5 +227,10 @@ impl Section for SignalLayout {
         let accepted = Interval::from(0.0, "Hz");
         fields.numbers(Key { name: "band", meaning: band }, &mut self.band, accepted, 2);
         fields.custom_table(Self::TRANSMITTERS);
+        let offsets = "how much farther from the receivers than the source that it names each element of \
+                       `transmitters` is; by default 0";
+        let accepted = Interval::from(0.0, "m");
+        let offsets = Key { name: "transmitter_offsets", meaning: offsets };
+        fields.numbers(offsets, &mut self.transmitter_offsets, accepted, TRANSMITTERS_MAX);
     }
 }

@@ -8,6 +8,7 @@ use osteon_common::field_path::{element_path, quoted};
 use osteon_common::fields::{Choice, Key};
 use osteon_common::limits;
 use osteon_common::signal_layout::{SignalAxis, SignalLayout, Transmitter};
+use osteon_common::wave_settings::WaveSettings;
 
 use crate::document::Format;
 use crate::document_text::DocumentText;
@@ -27,6 +28,10 @@ const SIZE_LIMIT: SizeLimit =
 /// describe its own traces.
 const PASSED_OVER: [&str; 2] = ["solver", "bone"];
 
+/// Keys of lists of names, with the largest number of them.
+const AXES: (&str, usize) = (SignalLayout::AXES.name, limits::SIGNAL_AXES_MAX);
+const TRANSMITTERS: (&str, usize) = (SignalLayout::TRANSMITTERS.name, limits::TRANSMITTERS_MAX);
+
 /// The content of a probe file: a probe, its layers and its picking, and how its signals are recorded.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProbeDescription {
@@ -34,6 +39,8 @@ pub struct ProbeDescription {
     pub setup: Setup,
     /// How its signals are recorded.
     pub signals: SignalLayout,
+    /// Which guided waves are found in them.
+    pub waves: WaveSettings,
 }
 
 /// Reads and validates the probe file at `path`; its extension determines the format.
@@ -61,7 +68,10 @@ fn of_document(
     let root = document.tree()?;
     let mut reader = Reader::default();
     let [solver, bone] = PASSED_OVER;
-    let table = reader.root(&root, &["layers", "probe", "picking", SIGNALS.name, solver, bone]);
+    let table = reader.root(
+        &root,
+        &["layers", "probe", "picking", SIGNALS.name, WaveSettings::KEY.name, solver, bone],
+    );
     let refused = |reader: &Reader| -> Result<_, ContentError> {
         let refused: Invalid = reader.refuse(document, &root);
         Err(refused.into())
@@ -73,17 +83,20 @@ fn of_document(
     let setup = job_file::setup(&mut reader, &table, directory);
     let mut signals = SignalLayout::default();
     let section = reader::section(&mut reader, &table, SIGNALS.name, &mut signals);
-    let given = names(&mut reader, &section, SignalLayout::AXES.name, SignalAxis::Time);
+    let given = names(&mut reader, &section, AXES, SignalAxis::Time);
     signals.axes = given.unwrap_or(signals.axes);
     signals.variable = variable(&mut reader, &section);
-    let given = names(&mut reader, &section, SignalLayout::TRANSMITTERS.name, Transmitter::First);
+    let given = names(&mut reader, &section, TRANSMITTERS, Transmitter::First);
     signals.transmitters = given.unwrap_or(signals.transmitters);
+    let mut waves = WaveSettings::default();
+    reader::section(&mut reader, &table, WaveSettings::KEY.name, &mut waves);
     check::setup(&setup, &mut reader.violations);
     check::signals(&signals, &mut reader.violations);
+    check::waves(&waves, &mut reader.violations);
     if !reader.violations.is_empty() {
         return refused(&reader);
     }
-    Ok(ProbeDescription { setup, signals })
+    Ok(ProbeDescription { setup, signals, waves })
 }
 
 /// Reads the name of an array; `None` if it is absent, or no name.
@@ -99,11 +112,11 @@ fn variable(reader: &mut Reader, table: &Table<'_>) -> Option<String> {
     Some(name.to_owned())
 }
 
-/// Reads the list `key` of choices, each as `any` is; `None` if it is absent, or one of them is no such choice.
+/// Reads the list `key` of at most `most` choices, each as `any` is; `None` if it is absent, or one of them is no such choice.
 fn names<T: Choice + Copy>(
     reader: &mut Reader,
     table: &Table<'_>,
-    key: &str,
+    (key, most): (&str, usize),
     any: T,
 ) -> Option<Vec<T>> {
     let accepted: Vec<_> = any.names().iter().map(|name| format!("\"{name}\"")).collect();
@@ -111,9 +124,8 @@ fn names<T: Choice + Copy>(
     let nodes = reader.list(table, key, &format!("a list of {accepted}"))?;
     let path = table.path(key);
     let texts = reader.texts(&path, nodes)?;
-    if texts.is_empty() || texts.len() > limits::SIGNAL_AXES_MAX {
+    if texts.is_empty() || texts.len() > most {
         let count = texts.len();
-        let most = limits::SIGNAL_AXES_MAX;
         reader.violations.add(path, format!("has {count} elements; it must have 1 to {most}"));
         return None;
     }
@@ -136,7 +148,7 @@ mod tests {
 
     fn check(text: &str, expected: &str) {
         let found = match parse(text, Format::Toml) {
-            Ok(ProbeDescription { setup, signals }) => format!(
+            Ok(ProbeDescription { setup, signals, .. }) => format!(
                 "{} receivers, {:?}, {:?}, {:?}",
                 setup.probe.receivers.count, signals.axes, signals.band, signals.transmitters
             ),

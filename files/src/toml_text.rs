@@ -18,6 +18,7 @@ use osteon_common::porosity::{POROSITY, PorosityModel};
 use osteon_common::pulse::PulseForm;
 use osteon_common::setup_quantity::SetupQuantity;
 use osteon_common::signal_layout::SignalLayout;
+use osteon_common::wave_settings::WaveSettings;
 
 use crate::job_file::decays;
 use crate::probe_file::{ProbeDescription, SIGNALS};
@@ -82,7 +83,12 @@ pub fn probe(description: &ProbeDescription) -> String {
             writeln!(out, "{} = {}", SignalLayout::AXES.name, names(axes))?;
         }
         let transmitters = transmitters.iter().map(|one| one.name()).collect();
-        writeln!(out, "{} = {}", SignalLayout::TRANSMITTERS.name, names(transmitters))
+        writeln!(out, "{} = {}", SignalLayout::TRANSMITTERS.name, names(transmitters))?;
+        if description.waves == WaveSettings::default() {
+            return Ok(());
+        }
+        writeln!(out)?;
+        section(out, WaveSettings::KEY, &mut description.waves.clone())
     })
 }
 

@@ -13,4 +13,5 @@ pub mod observations;
 pub mod reach;
 pub mod shapes;
 pub mod simulation;
+pub mod source_traces;
 pub mod synthesis;

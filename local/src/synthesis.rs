@@ -23,6 +23,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use self::noise::NoiseStream;
+use crate::source_traces::source_traces;
 
 /// Samples in a period of the centre frequency, unless the time step is given.
 const SAMPLES_OF_PERIOD: f64 = 50.0;
@@ -51,6 +52,22 @@ pub struct Recorder {
     pub full_scale: Option<f64>,
     /// Time between samples, s; `None`: a fiftieth of the period of the centre frequency.
     pub time_step: Option<f64>,
+    /// Time of the last sample, s; `None`: some periods after the latest first signal.
+    pub duration: Option<f64>,
+    /// Number of sources beyond each of the probe's own.
+    pub further_sources: u32,
+    /// Distance of these neighbours, m.
+    pub source_pitch: f64,
+}
+
+impl Recorder {
+    /// Returns the sources of a probe, each with how much farther it is than the probe's own on its side, m.
+    fn sources(&self, is_bidirectional: bool) -> Vec<(Transmitter, f64)> {
+        let sides = if is_bidirectional { &Transmitter::ALL[..] } else { &[Transmitter::First] };
+        let offset = |n: u32| f64::from(n) * self.source_pitch;
+        let of_side = |&side| (0..=self.further_sources).map(move |n| (side, offset(n)));
+        sides.iter().flat_map(of_side).collect()
+    }
 }
 
 /// Signals of many bones, as whole numbers of a recorder.
@@ -186,7 +203,8 @@ struct RecordingDevice<'a> {
     ensemble: Ensemble,
     solver: Solver,
     recorder: Recorder,
-    transmitters: Vec<Transmitter>,
+    /// Each with how much farther it is than the probe's own on its side, m.
+    sources: Vec<(Transmitter, f64)>,
     /// Time between samples, and of the last one, s.
     step: f64,
     duration: f64,
@@ -216,8 +234,9 @@ impl<'a> RecordingDevice<'a> {
         let period = 1.0 / setup.probe.center_frequency;
         let latest = arrival.times.iter().fold(0.0, |latest: f64, time| latest.max(*time));
         let step = recorder.time_step.unwrap_or(period / SAMPLES_OF_PERIOD);
-        let duration = latest * (1.0 + LATER_BY) + PERIODS_AFTER * period;
-        let traces = solver.traces(&mean, duration, step)?;
+        let usual = latest * (1.0 + LATER_BY) + PERIODS_AFTER * period;
+        let duration = recorder.duration.unwrap_or(usual);
+        let traces = solver.traces(&mean, duration.max(usual), step)?;
         let packets = traces.pressures.iter().zip(&arrival.times).map(|(trace, time)| {
             let place = |time: f64| ((time / step) as usize).min(trace.len());
             peak(&trace[place(*time)..place(time + PACKET_PERIODS * period)])
@@ -226,15 +245,11 @@ impl<'a> RecordingDevice<'a> {
         let largest = traces.pressures.iter().map(|trace| peak(trace)).fold(0.0, f64::max);
         let scale = recorder.full_scale.map_or(HEADROOM * largest, |ratio| ratio * packet);
         let gain = |_| decibels(recorder.gain_db * device.normal());
-        let transmitters = match setup.probe.bidirectional {
-            true => Transmitter::ALL.to_vec(),
-            false => vec![Transmitter::First],
-        };
         Ok(Self {
             specification,
             ensemble,
             recorder: *recorder,
-            transmitters,
+            sources: recorder.sources(setup.probe.bidirectional),
             step,
             duration,
             noise: recorder.noise_db.map_or(0.0, |level| packet * decibels(-level)),
@@ -248,7 +263,7 @@ impl<'a> RecordingDevice<'a> {
     fn lengths(&self) -> Vec<usize> {
         let (receivers, samples) =
             (self.gains.len(), (self.duration / self.step + 1e-9) as usize + 1);
-        match self.transmitters.len() {
+        match self.sources.len() {
             1 => vec![receivers, samples],
             several => vec![several, receivers, samples],
         }
@@ -272,17 +287,9 @@ impl<'a> RecordingDevice<'a> {
         let seed = self.specification.monte_carlo.seed;
         let mut random = NoiseStream::of_series(seed, index);
         let mut samples = Vec::with_capacity(self.samples_of_series() as usize);
-        for transmitter in &self.transmitters {
-            let mut setup = case.setup.clone();
-            if *transmitter == Transmitter::Second {
-                setup.probe = setup.probe.from_other_side();
-            }
-            let solver = Solver::with_isa(&setup, self.solver.isa());
-            let mut traces = solver.traces(&case.bone, self.duration, self.step)?.pressures;
-            if *transmitter == Transmitter::Second {
-                // The solver counts receivers from the source on, and an array along the probe.
-                traces.reverse();
-            }
+        for source in &self.sources {
+            let sampling = (self.duration, self.step);
+            let traces = source_traces(&case, *source, sampling, self.solver.isa())?;
             for (trace, gain) in traces.iter().zip(&self.gains) {
                 let is_dead = random.uniform() < self.recorder.dropouts;
                 samples.extend(trace.iter().map(|pressure| {
@@ -303,7 +310,7 @@ impl<'a> RecordingDevice<'a> {
         let mut setup = self.solver.setup().clone();
         setup.solver.method = Method::Exact;
         let usual = [SignalAxis::Receiver, SignalAxis::Time];
-        let of_sources = (self.transmitters.len() > 1).then_some(SignalAxis::Transmitter);
+        let of_sources = (self.sources.len() > 1).then_some(SignalAxis::Transmitter);
         let band = match self.recorder.noise_db {
             Some(_) => vec![0.0, BAND * setup.probe.center_frequency],
             None => Vec::new(),
@@ -314,10 +321,14 @@ impl<'a> RecordingDevice<'a> {
             unit: SignalUnit::Counts,
             full_scale: Some(COUNTS),
             band,
-            transmitters: self.transmitters.clone(),
+            transmitters: self.sources.iter().map(|(side, _)| *side).collect(),
+            transmitter_offsets: match self.recorder.further_sources {
+                0 => Vec::new(),
+                _ => self.sources.iter().map(|(_, offset)| *offset).collect(),
+            },
             ..SignalLayout::default()
         };
-        ProbeDescription { setup, signals }
+        ProbeDescription { setup, signals, ..ProbeDescription::default() }
     }
 }
 

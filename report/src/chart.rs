@@ -1,6 +1,8 @@
 //! Charts: what is drawn, as numbers. [`Chart::svg`] draws it, and [`Chart::csv`] writes the numbers.
 
 mod draw;
+mod frame;
+mod raster;
 mod scale;
 
 use std::fmt::Write as _;
@@ -170,8 +172,21 @@ pub(crate) enum Shape {
     Upright(f64),
     /// Filled rectangles: left, right, bottom, top.
     Rectangles(Vec<[f64; 4]>),
+    /// Cells of equal size coloured by their values, 0 to 1.
+    Raster(Raster),
     /// Texts, each beginning at a point.
     Texts(Vec<([f64; 2], String)>),
+}
+
+/// Values over both axes.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Raster {
+    /// Left and right end.
+    pub(crate) x: [f64; 2],
+    /// Lower and upper end.
+    pub(crate) y: [f64; 2],
+    /// Columns from left to right, each with its values from below.
+    pub(crate) columns: Vec<Vec<f64>>,
 }
 
 impl Shape {
@@ -184,7 +199,7 @@ impl Shape {
             Self::Band(_) => "band",
             Self::Bars(_) => "bars",
             Self::Intervals(_) => "intervals",
-            Self::Rectangles(_) | Self::Texts(_) => "",
+            Self::Rectangles(_) | Self::Raster(_) | Self::Texts(_) => "",
         }
     }
 
@@ -206,6 +221,7 @@ impl Shape {
             Self::Level(y) => without_text(vec![[NONE, NONE, *y, NONE]]),
             Self::Upright(x) => without_text(vec![[*x, NONE, NONE, NONE]]),
             Self::Rectangles(all) => without_text(all.clone()),
+            Self::Raster(Raster { x, y, .. }) => without_text(vec![[x[0], x[1], y[0], y[1]]]),
             Self::Texts(texts) => {
                 texts.iter().map(|([x, y], text)| ([*x, NONE, *y, NONE], text.as_str())).collect()
             }

@@ -14,6 +14,7 @@ mod setup;
 mod solutions;
 mod traces;
 mod velocities;
+mod wave_image;
 
 use crate::finding::Finding;
 
@@ -23,6 +24,7 @@ pub(crate) use figure::Figure;
 pub(crate) use groups::forest;
 pub(crate) use setup::setup_figure;
 pub(crate) use traces::trace_figures;
+pub use wave_image::wave_image_figure;
 
 /// Figures under a heading.
 #[derive(Debug, Clone, PartialEq)]

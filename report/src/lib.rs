@@ -21,7 +21,7 @@ mod table;
 mod text;
 
 pub use course::SearchCourse;
-pub use figures::dispersion_figure;
+pub use figures::{dispersion_figure, wave_image_figure};
 pub use input::{JobTables, ReportedRun};
 pub use live::{LiveFigure, SCRIPT, STYLES, failure_figure, search_figures};
 pub use page::{Report, ReportText, files_of, report};

@@ -7,6 +7,8 @@ use osteon_common::signal_layout::Transmitter;
 pub struct ArraySignals {
     /// The source.
     pub transmitter: Transmitter,
+    /// How much farther from the receivers than that source the one is that emitted, m.
+    pub offset: f64,
     /// Time of the first sample after the pulse begins, s.
     pub start: f64,
     /// Time between samples, s, above 0.

@@ -25,6 +25,7 @@ mod receiver_signal;
 mod series_pick;
 mod stacked;
 mod template;
+mod waves;
 
 pub use array_decision::PickRefusal;
 pub use array_signals::{ArraySignals, SignalSeries};
@@ -34,3 +35,6 @@ pub use picked_series::{PickedSeries, to_csv, to_json};
 pub use reading_error::{SignalFault, SignalFileError};
 pub use series_pick::{SeriesPick, SeriesPicker};
 pub use template::{own_description, template};
+pub use waves::{
+    DispersionImage, ImageGrid, WaveEstimate, WaveFailure, WaveFinder, WavePick, WaveTarget,
+};

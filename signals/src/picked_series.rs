@@ -10,6 +10,7 @@ use crate::array_decision::PickRefusal;
 use crate::direction::{ReceiverPick, VelocityEstimate};
 use crate::pick_failure::PickFailure;
 use crate::series_pick::SeriesPick;
+use crate::waves::{WaveFailure, WavePick, WaveTarget};
 
 /// The header of the CSV file.
 const COLUMNS: &str = "velocity,standard_error,quality,failure";
@@ -23,6 +24,8 @@ pub struct PickedSeries {
     pub positions: Vec<f64>,
     /// What was found.
     pub pick: SeriesPick,
+    /// The guided waves that were looked for.
+    pub waves: Vec<WavePick>,
 }
 
 impl PickedSeries {
@@ -36,16 +39,33 @@ impl PickedSeries {
 }
 
 /// Returns the rows of all series as CSV: velocity and standard error in m/s, empty if there is none; quality
-/// from 0 to 1; the name of the failure, empty if there is none. Comments above them state the criterion.
-pub fn to_csv(series: &[PickedSeries], picking: &Picking) -> String {
-    let row = |one: &PickedSeries| match &one.pick.estimate {
-        Ok(VelocityEstimate { velocity, standard_error, quality }) => {
-            format!("{velocity:?},{standard_error:?},{quality:?},\n")
-        }
-        Err(refusal) => format!(",,0.0,{}\n", refusal.failure.name()),
+/// from 0 to 1; the name of the failure, empty if there is none; and likewise for the guided waves `targets` of
+/// each series. Comments above them state the criterion.
+pub fn to_csv(series: &[PickedSeries], targets: &[WaveTarget], picking: &Picking) -> String {
+    let names = targets.iter().flat_map(WaveTarget::columns);
+    let header: Vec<String> = std::iter::once(COLUMNS.to_owned()).chain(names).collect();
+    let head = picking_comment::of_picking(picking) + &header.join(",") + "\n";
+    let row = |one: &PickedSeries| {
+        let waves: String = one.waves.iter().map(wave_fields).collect();
+        format!("{}{waves}\n", velocity_fields(&one.pick))
     };
-    let head = picking_comment::of_picking(picking) + COLUMNS + "\n";
     std::iter::once(head).chain(series.iter().map(row)).collect()
+}
+
+fn velocity_fields(pick: &SeriesPick) -> String {
+    match &pick.estimate {
+        Ok(VelocityEstimate { velocity, standard_error, quality }) => {
+            format!("{velocity:?},{standard_error:?},{quality:?},")
+        }
+        Err(refusal) => format!(",,0.0,{}", refusal.failure.name()),
+    }
+}
+
+fn wave_fields(pick: &WavePick) -> String {
+    match &pick.estimate {
+        Ok(found) => format!(",{:?},{:?},", found.phase_velocity, found.standard_error),
+        Err(failure) => format!(",,,{}", failure.name()),
+    }
 }
 
 #[derive(Serialize)]
@@ -64,6 +84,16 @@ struct SeriesJson<'a> {
     detail: Option<&'a str>,
     directions: Option<[f64; 2]>,
     receivers: Vec<ReceiverJson>,
+    waves: Vec<WaveJson>,
+}
+
+#[derive(Serialize)]
+struct WaveJson {
+    wave: &'static str,
+    frequency: f64,
+    phase_velocity: Option<f64>,
+    standard_error: Option<f64>,
+    failure: Option<WaveFailure>,
 }
 
 #[derive(Serialize)]
@@ -105,10 +135,22 @@ pub fn to_json(
                     detail: picked.refusal().map(|it| it.detail.as_str()),
                     directions: picked.pick.directions,
                     receivers,
+                    waves: picked.waves.iter().map(wave_json).collect(),
                 }
             })
             .collect(),
         picking,
     };
     serde_json::to_string_pretty(&picks).map(|text| text + "\n")
+}
+
+fn wave_json(pick: &WavePick) -> WaveJson {
+    let found = pick.estimate.as_ref().ok();
+    WaveJson {
+        wave: pick.target.wave.row().short,
+        frequency: pick.target.frequency,
+        phase_velocity: found.map(|it| it.phase_velocity),
+        standard_error: found.map(|it| it.standard_error),
+        failure: pick.estimate.as_ref().err().copied(),
+    }
 }

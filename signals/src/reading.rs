@@ -109,13 +109,16 @@ impl SignalFile {
                     array.series(&recorded.axes, number).map_err(located)?.directions()
                 }
             };
-            let transmitters = &description.signals.transmitters;
+            let sources = description.signals.sources();
             let directions =
-                directions.into_iter().zip(transmitters).map(|(receivers, &one)| ArraySignals {
-                    transmitter: one,
-                    start: recorded.start,
-                    step: recorded.step,
-                    receivers,
+                directions.into_iter().zip(sources).map(|(receivers, (transmitter, offset))| {
+                    ArraySignals {
+                        transmitter,
+                        offset,
+                        start: recorded.start,
+                        step: recorded.step,
+                        receivers,
+                    }
                 });
             let series = SignalSeries { directions: directions.collect() };
             usable(number + 1, &series).map_err(located)?;

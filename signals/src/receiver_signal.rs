@@ -162,7 +162,7 @@ fn noise_of(samples: &[f64], quiet: Range<usize>, step: f64, slopes: &SampleSlop
 
 /// Returns a range of samples, or its later half if the signals there are much smaller, as when the pulse couples
 /// into the receiver.
-fn of_one_kind(samples: &[f64], range: Range<usize>) -> Range<usize> {
+pub(crate) fn of_one_kind(samples: &[f64], range: Range<usize>) -> Range<usize> {
     let later = range.start.midpoint(range.end)..range.end;
     let scatter = |range: &Range<usize>| {
         let part = &samples[range.clone()];
@@ -180,7 +180,7 @@ fn deviation(values: &[f64]) -> f64 {
 
 /// Returns the first sample that is clipped: of full size, or one of many equal ones at the largest or the
 /// smallest value of the record.
-fn first_clipped(raw: &[f64], period: f64, full_scale: Option<f64>) -> Option<usize> {
+pub(crate) fn first_clipped(raw: &[f64], period: f64, full_scale: Option<f64>) -> Option<usize> {
     let full = full_scale.and_then(|full| raw.iter().position(|sample| sample.abs() >= full));
     let enough = ((CLIPPED_PERIODS * period).ceil() as usize).max(CLIPPED_SAMPLES_MIN);
     let (least, most) = raw

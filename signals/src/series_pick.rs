@@ -41,7 +41,9 @@ impl SeriesPicker {
     ///
     /// Each array must have the probe's number of receivers.
     pub fn pick(&self, series: &SignalSeries) -> SeriesPick {
-        let picks: Vec<_> = series.directions.iter().map(|array| self.direction(array)).collect();
+        // The model has a source at either end; those beyond them only tell waves apart.
+        let ends = series.directions.iter().filter(|array| array.offset == 0.0);
+        let picks: Vec<_> = ends.map(|array| self.direction(array)).collect();
         let receivers = picks.first().map(|pick| pick.receivers.clone()).unwrap_or_default();
         let both = match picks.as_slice() {
             [one, other] => Some((one, other)),

@@ -22,6 +22,16 @@ pub(crate) struct PickArguments {
     /// New file of the velocities (CSV)
     #[arg(long, short, value_name = "velocities.csv")]
     pub(crate) out: Option<PathBuf>,
+    /// New file of the image of guided waves over frequency and wavenumber (SVG), in the mean over all series,
+    /// with the waves that were found
+    #[arg(long, value_name = "image.svg", conflicts_with = "init")]
+    pub(crate) image: Option<PathBuf>,
+    /// Draw the waves of the bone of this case over the image
+    #[arg(long, value_name = "CASE.toml", requires = "image")]
+    pub(crate) model: Option<PathBuf>,
+    /// Of the model, draw the waves between coupling and marrow as half-spaces instead of those in a vacuum
+    #[arg(long, requires = "model")]
+    pub(crate) in_fluids: bool,
     /// Print velocities and times as JSON
     #[arg(long)]
     pub(crate) json: bool,

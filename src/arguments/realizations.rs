@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use osteon_local::design::MeasurementPlan;
 
-use super::{JobFileArguments, positive};
+use super::{JobFileArguments, length, positive};
 
 /// Arguments of `draw`.
 #[derive(Debug, Args)]
@@ -78,6 +78,16 @@ pub(crate) struct SynthesizeArguments {
     /// Time between samples (seconds) [default: a fiftieth of the period of the centre frequency]
     #[arg(long, value_name = "S", value_parser = positive)]
     pub(crate) time_step: Option<f64>,
+    /// Time of the last sample (seconds) [default: some periods after the first signal, before guided waves end]
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub(crate) duration: Option<f64>,
+    /// Number of sources beyond each of the probe's own, which tell guided waves apart
+    #[arg(long, value_name = "N", default_value = "0", requires = "source_pitch")]
+    #[arg(value_parser = clap::value_parser!(u32).range(..=31))]
+    pub(crate) further_sources: u32,
+    /// Distance between neighbouring sources (m)
+    #[arg(long, value_name = "M", value_parser = length)]
+    pub(crate) source_pitch: Option<f64>,
     /// The point.
     #[command(flatten)]
     pub(crate) place: PlaceArguments,

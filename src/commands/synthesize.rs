@@ -36,9 +36,17 @@ pub(super) async fn synthesize(arguments: SynthesizeArguments, isa: Isa, cores: 
     for name in [SIGNALS, PROBE, TRUTH] {
         new_files::refuse_existing(&arguments.out.join(name))?;
     }
-    let SynthesizeArguments { series, noise_db, gain_db, dropouts, full_scale, time_step, .. } =
-        arguments;
-    let recorder = Recorder { noise_db, gain_db, dropouts, full_scale, time_step };
+    let SynthesizeArguments { series, .. } = arguments;
+    let recorder = Recorder {
+        noise_db: arguments.noise_db,
+        gain_db: arguments.gain_db,
+        dropouts: arguments.dropouts,
+        full_scale: arguments.full_scale,
+        time_step: arguments.time_step,
+        duration: arguments.duration,
+        further_sources: arguments.further_sources,
+        source_pitch: arguments.source_pitch.unwrap_or_default(),
+    };
     let threads = arguments.threads.unwrap_or(cores) as usize;
     let style = ProgressStyle::with_template(BAR).map_err(CommandFailure::failed)?;
     let record = move || {

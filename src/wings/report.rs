@@ -50,6 +50,16 @@ pub(crate) fn dispersion_figure(series: &[(&'static str, Vec<[f64; 2]>)]) -> Opt
     Some(report_directory::dispersion_figure(series))
 }
 
+/// Returns a figure of an image of guided waves as SVG: frequencies (Hz), wavenumbers (rad/m) and for each frequency
+/// the values; with the model's waves and those that were found, by frequency (Hz) and phase velocity (m/s).
+pub(crate) fn wave_image_figure(
+    image: (&[f64], &[f64], Vec<Vec<f64>>),
+    families: &[(&'static str, Vec<[f64; 2]>)],
+    found: &[[f64; 2]],
+) -> Option<String> {
+    Some(report_directory::wave_image_figure(image, families, found))
+}
+
 /// Reads the results, and writes their report.
 pub(super) fn report(arguments: &ReportArguments) -> Ended {
     let directories = &arguments.directories;

@@ -59,6 +59,16 @@ pub(crate) fn dispersion_figure(_: &[(&'static str, Vec<[f64; 2]>)]) -> Option<S
     None
 }
 
+/// No figure.
+#[cfg(not(feature = "report"))]
+pub(crate) fn wave_image_figure(
+    _: (&[f64], &[f64], Vec<Vec<f64>>),
+    _: &[(&'static str, Vec<[f64; 2]>)],
+    _: &[[f64; 2]],
+) -> Option<String> {
+    None
+}
+
 #[cfg(not(feature = "live"))]
 pub(crate) use self::live::{PageOptions, RunPageOption};
 #[cfg(not(feature = "report"))]

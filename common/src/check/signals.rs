@@ -1,6 +1,6 @@
 //! Rules on how signals are recorded.
 
-use crate::signal_layout::{SignalAxis, SignalLayout};
+use crate::signal_layout::{SignalAxis, SignalLayout, Transmitter};
 use crate::violations::Violations;
 
 use super::section::section;
@@ -50,19 +50,41 @@ fn band(layout: &SignalLayout, violations: &mut Violations) {
 
 fn transmitters(layout: &SignalLayout, violations: &mut Violations) {
     const FIELD: &str = "signals.transmitters";
-    if violations.has_at_or_below(FIELD) {
+    const OFFSETS: &str = "signals.transmitter_offsets";
+    if violations.has_at_or_below(FIELD) || violations.has_at_or_below(OFFSETS) {
         return;
     }
-    let names = || layout.transmitters.iter().map(|one| format!("\"{}\"", one.name()));
-    match layout.transmitters.as_slice() {
-        [_] => {}
-        [one, other] if one != other => {}
-        _ => violations.add(
-            FIELD,
-            format!(
-                "is [{}]; it must name one source, or both",
-                names().collect::<Vec<_>>().join(", ")
-            ),
-        ),
+    let (names, offsets) = (&layout.transmitters, &layout.transmitter_offsets);
+    if offsets.is_empty() {
+        match names.as_slice() {
+            [_] => {}
+            [one, other] if one != other => {}
+            _ => {
+                let names: Vec<_> = names.iter().map(|one| format!("\"{}\"", one.name())).collect();
+                let message = format!(
+                    "is [{}]; it must name one source, or both, unless transmitter_offsets says where each is",
+                    names.join(", ")
+                );
+                violations.add(FIELD, message);
+            }
+        }
+        return;
+    }
+    if offsets.len() != names.len() {
+        let message =
+            format!("has {} elements, and signals.transmitters {}", offsets.len(), names.len());
+        return violations.add(OFFSETS, message);
+    }
+    for side in Transmitter::ALL.into_iter().filter(|side| names.contains(side)) {
+        let of_side = layout.sources().filter(|(name, _)| *name == side);
+        let mut of_side: Vec<f64> = of_side.map(|(_, offset)| offset).collect();
+        of_side.sort_by(f64::total_cmp);
+        if of_side[0] != 0.0 || of_side.windows(2).any(|two| two[0] == two[1]) {
+            let message = format!(
+                "has {of_side:?} for \"{}\"; they must differ, and one must be 0, that of the source itself",
+                side.name()
+            );
+            violations.add(OFFSETS, message);
+        }
     }
 }

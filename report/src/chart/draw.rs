@@ -3,6 +3,8 @@
 
 use std::fmt::Write as _;
 
+use super::frame::{Frame, coordinate};
+use super::raster::{cells, colour_bar, key_width};
 use super::scale::Tick;
 use super::{Axis, AxisScale, Chart, ChartLayer, Ink, Shape};
 use crate::text::{escape, shorten};
@@ -22,40 +24,6 @@ const KEY_CHARACTER: f64 = 7.3;
 const LINE: f64 = 17.0;
 /// Most characters of a category's name.
 const CATEGORY_CHARACTERS: usize = 26;
-
-/// The plot within the chart, and its scales.
-struct Frame {
-    left: f64,
-    top: f64,
-    width: f64,
-    height: f64,
-    x: AxisScale,
-    y: AxisScale,
-    /// Whether the vertical axis grows downwards, as lists do.
-    downwards: bool,
-}
-
-impl Frame {
-    /// Returns the position of a value within the plot.
-    fn x(&self, value: f64) -> f64 {
-        self.x.position(value) * self.width
-    }
-
-    /// Same as [`x`](Self::x) for the vertical axis.
-    fn y(&self, value: f64) -> f64 {
-        let position = self.y.position(value);
-        self.height * if self.downwards { position } else { 1.0 - position }
-    }
-
-    /// Returns a point as text; `None` where it is not finite, or so far outside that it is not drawn.
-    fn point(&self, x: f64, y: f64) -> Option<String> {
-        let (x, y) = (self.x(x), self.y(y));
-        // A logarithm of 0 lies far below.
-        let y = if y == f64::INFINITY { 2.0 * self.height } else { y };
-        let near = |value: f64| value.is_finite() && value.abs() < 1e5;
-        (near(x) && near(y)).then(|| format!("{},{}", coordinate(x), coordinate(y)))
-    }
-}
 
 impl Chart {
     /// Returns the chart as an element of a page; its colours come from [`STYLE`].
@@ -196,7 +164,10 @@ fn legend(layers: &[ChartLayer]) -> Vec<Vec<(f64, &ChartLayer)>> {
     let mut rows: Vec<Vec<(f64, &ChartLayer)>> = Vec::new();
     let mut free = f64::INFINITY;
     for layer in layers.iter().filter(|layer| !layer.name.is_empty()) {
-        let width = 30.0 + layer.name.chars().count() as f64 * KEY_CHARACTER + 14.0;
+        let width = key_width(is_raster(layer))
+            + 8.0
+            + layer.name.chars().count() as f64 * KEY_CHARACTER
+            + 14.0;
         if free + width > WIDTH {
             rows.push(Vec::new());
             free = 2.0;
@@ -214,6 +185,7 @@ fn legend_row(out: &mut String, entries: &[(f64, &ChartLayer)], y: f64) {
         let (class, middle) = (class(layer.ink), y - 4.0);
         let [from, to, at] = [*x, *x + 22.0, middle].map(coordinate);
         let _infallible = match layer.shape {
+            Shape::Raster(_) => colour_bar(out, class, *x, middle),
             Shape::Band(_) | Shape::Bars(_) | Shape::Rectangles(_) => {
                 let (kind, top) = (area_class(&layer.shape), coordinate(middle - 5.0));
                 write!(
@@ -228,8 +200,12 @@ fn legend_row(out: &mut String, entries: &[(f64, &ChartLayer)], y: f64) {
             }
             _ => write!(out, "<path class=\"line {class}\" d=\"M{from} {at}H{to}\"/>"),
         };
-        text(out, "key", x + 28.0, y, &layer.name);
+        text(out, "key", x + key_width(is_raster(layer)) + 6.0, y, &layer.name);
     }
+}
+
+fn is_raster(layer: &ChartLayer) -> bool {
+    matches!(layer.shape, Shape::Raster(_))
 }
 
 fn draw(out: &mut String, layer: &ChartLayer, frame: &Frame) {
@@ -289,6 +265,7 @@ fn draw(out: &mut String, layer: &ChartLayer, frame: &Frame) {
             let (x, bottom) = (coordinate(frame.x(*x)), coordinate(frame.height));
             write!(out, "<path class=\"line {class}\" d=\"M{x} 0V{bottom}\"/>")
         }
+        Shape::Raster(raster) => cells(out, class, raster, frame),
         Shape::Texts(texts) => {
             for ([x, y], words) in texts {
                 text(out, "note", frame.x(*x), frame.y(*y), words);
@@ -363,13 +340,6 @@ fn class(ink: Ink) -> &'static str {
         Ink::Fourth => "c4",
         Ink::Muted => "c0",
     }
-}
-
-/// Returns a coordinate to a tenth: a screen shows no less.
-fn coordinate(value: f64) -> String {
-    let text = format!("{value:.1}");
-    let text = text.strip_suffix(".0").unwrap_or(&text);
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 #[cfg(test)]

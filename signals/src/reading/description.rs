@@ -90,7 +90,7 @@ fn of_table(
     description: &ProbeDescription,
     table: &TraceTable,
 ) -> Result<RecordedSeries, SignalFault> {
-    let ProbeDescription { setup, signals } = description;
+    let ProbeDescription { setup, signals, .. } = description;
     let receivers = &setup.probe.receivers;
     receiver_count(description, table.positions.len(), "columns")?;
     for (index, (expected, &found)) in receivers.positions().zip(&table.positions).enumerate() {

@@ -33,7 +33,7 @@ pub(crate) fn signals(setup: &Setup, transmitter: Transmitter) -> ArraySignals {
     if transmitter == Transmitter::Second {
         receivers.reverse();
     }
-    ArraySignals { transmitter, start: 0.0, step, receivers }
+    ArraySignals { transmitter, offset: 0.0, start: 0.0, step, receivers }
 }
 
 /// The case's probe, with a filter if the signals have noise.
