@@ -183,8 +183,8 @@ fn recorder(noise_db: f64, dropouts: f64) -> Recorder {
         noise_db: Some(noise_db),
         gain_db: 1.0,
         dropouts,
-        full_scale: None,
         time_step: Some(TIME_STEP),
+        ..Recorder::default()
     }
 }
 
@@ -196,6 +196,7 @@ fn pick(study: &SyntheticStudy) -> Vec<Measurement> {
         let recorded = description.signals.transmitters.iter().zip(study.signals(series));
         let directions = recorded.map(|(&transmitter, receivers)| ArraySignals {
             transmitter,
+            offset: 0.0,
             start: 0.0,
             step: TIME_STEP,
             receivers,
