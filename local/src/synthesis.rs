@@ -7,6 +7,7 @@ mod npy;
 
 use std::fmt::Write as _;
 
+use osteon_common::case::Case;
 use osteon_common::germ_source::GermSource;
 use osteon_common::job::JobSpecification;
 use osteon_common::limits::SIGNAL_SAMPLES_MAX;
@@ -242,18 +243,25 @@ impl<'a> RecordingDevice<'a> {
             peak(&trace[place(*time)..place(time + PACKET_PERIODS * period)])
         });
         let packet = packets.sum::<f64>() / arrival.times.len() as f64;
-        let largest = traces.pressures.iter().map(|trace| peak(trace)).fold(0.0, f64::max);
+        let mut largest = traces.pressures.iter().map(|trace| peak(trace)).fold(0.0, f64::max);
+        let sources = recorder.sources(setup.probe.bidirectional);
+        // Waves may be larger from farther sources, where several add up.
+        let case = Case { setup, bone: mean };
+        for source in sources.iter().filter(|(_, offset)| *offset > 0.0) {
+            let traces = source_traces(&case, *source, (duration, step), isa)?;
+            largest = traces.iter().map(|trace| peak(trace)).fold(largest, f64::max);
+        }
         let scale = recorder.full_scale.map_or(HEADROOM * largest, |ratio| ratio * packet);
         let gain = |_| decibels(recorder.gain_db * device.normal());
         Ok(Self {
             specification,
             ensemble,
             recorder: *recorder,
-            sources: recorder.sources(setup.probe.bidirectional),
+            sources,
             step,
             duration,
             noise: recorder.noise_db.map_or(0.0, |level| packet * decibels(-level)),
-            gains: (0..setup.probe.receivers.count).map(gain).collect(),
+            gains: (0..case.setup.probe.receivers.count).map(gain).collect(),
             count: scale / COUNTS,
             solver,
         })

@@ -132,14 +132,14 @@ impl PickErrors {
 }
 
 /// A velocity that was picked, and that of the model.
-type Measurement = (Option<VelocityEstimate>, Outcome);
+type PickedVelocity = (Option<VelocityEstimate>, Outcome);
 
 /// Records and picks the measurements of one device.
 fn picked_by_device(
     twins: &Twins,
     number: u64,
     level: f64,
-) -> Result<Vec<Measurement>, StudyError> {
+) -> Result<Vec<PickedVelocity>, StudyError> {
     let mut setup = Setup::default();
     setup.probe.bidirectional = true;
     let recorder = recorder(level, 0.02);
@@ -189,7 +189,7 @@ fn recorder(noise_db: f64, dropouts: f64) -> Recorder {
 }
 
 /// Picks all series of a study.
-fn pick(study: &SyntheticStudy) -> Vec<Measurement> {
+fn pick(study: &SyntheticStudy) -> Vec<PickedVelocity> {
     let description = study.description();
     let picker = SeriesPicker::new(description.clone());
     let picked = study.truths().iter().enumerate().map(|(series, truth)| {
