@@ -18,8 +18,8 @@ use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, designs,
-    digest, failures, methods, models, porosities, refinement, searches, setup_errors, setups,
-    stacks, variance,
+    digest, failures, hierarchies, methods, models, porosities, refinement, searches, setup_errors,
+    setups, stacks, variance,
 };
 
 use crate::arguments::{
@@ -92,6 +92,8 @@ const SETUP_ERRORS: OverTwins = OverTwins {
 };
 const DESIGNS: OverTwins =
     OverTwins { name: "designs", repetitions: designs::STUDIES, table: designs::table };
+const HIERARCHIES: OverTwins =
+    OverTwins { name: "hierarchies", repetitions: hierarchies::STUDIES, table: hierarchies::table };
 const UNMODELLED_PROFILES: OverTwins =
     OverTwins { name: "unmodelled-profiles", repetitions: 1, table: porosities::unmodelled };
 
@@ -143,6 +145,7 @@ fn run_study(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::Porosities(arguments) => run_over_twins(&POROSITIES, arguments, isa),
         Study::PorosityProfiles(arguments) => run_over_twins(&POROSITY_PROFILES, arguments, isa),
         Study::SetupErrors(arguments) => run_over_twins(&SETUP_ERRORS, arguments, isa),
+        Study::Hierarchies(arguments) => run_over_twins(&HIERARCHIES, arguments, isa),
         Study::Designs(arguments) => run_over_twins(&DESIGNS, arguments, isa),
         Study::UnmodelledProfiles(arguments) => {
             run_over_twins(&UNMODELLED_PROFILES, arguments, isa)

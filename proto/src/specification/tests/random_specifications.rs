@@ -5,6 +5,7 @@ use osteon_common::bone_structure::{
 };
 use osteon_common::case::Setup;
 use osteon_common::fluid_sublayers::{FluidSublayer, FluidSublayers};
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     PosteriorPrior, PosteriorSettings, PriorDistribution, Sampling, SearchMethod,
 };
@@ -326,6 +327,7 @@ prop_compose! {
             parameters,
             random,
             systematic,
+            groups: GroupSettings::default(),
             monte_carlo: MonteCarlo {
                 realizations: points * scrambles.unwrap_or(1),
                 seed,
