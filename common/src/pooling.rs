@@ -60,12 +60,12 @@ pub struct Pooling {
     scale: f64,
     /// Part of the prior's probability between two nodes.
     step: f64,
-    nodes: Vec<Node>,
+    nodes: Vec<ScatterNode>,
 }
 
 /// One value of the scatter, and what follows for the mean.
 #[derive(Debug, Clone, PartialEq)]
-struct Node {
+struct ScatterNode {
     /// Prior probability of a smaller scatter.
     below: f64,
     scatter: f64,
@@ -100,7 +100,7 @@ impl Pooling {
 
     /// Returns the mean over the groups of which these are some.
     pub fn mean(&self) -> PooledNumber {
-        let component = |node: &Node| (node.mean, node.variance + square_sum(&node.common));
+        let component = |node: &ScatterNode| (node.mean, node.variance + square_sum(&node.common));
         self.mixture(component).summary()
     }
 
@@ -113,7 +113,7 @@ impl Pooling {
 
     /// Returns the value of group number `group`, which is in range.
     pub fn group(&self, group: usize) -> PooledNumber {
-        let component = |node: &Node| {
+        let component = |node: &ScatterNode| {
             let (mean, own, towards) = self.given(node, group);
             let moved = self.moved(node, group);
             (mean, own + towards * towards * node.variance + square_sum(&moved))
@@ -123,7 +123,7 @@ impl Pooling {
 
     /// Returns the first group's value minus the second's; both are in range, and differ.
     pub fn difference(&self, first: usize, second: usize) -> PooledNumber {
-        let component = |node: &Node| {
+        let component = |node: &ScatterNode| {
             let (one, own, towards) = self.given(node, first);
             let (other, other_own, other_towards) = self.given(node, second);
             let by_mean = towards - other_towards;
@@ -144,7 +144,7 @@ impl Pooling {
     fn place_nodes(&mut self) {
         let scanned = self.nodes_between([0.0, 1.0], SCANNED);
         let largest = scanned.iter().map(|node| node.weight).fold(0.0, f64::max);
-        let is_plausible = |node: &Node| node.weight > largest * libm::exp(-NEGLIGIBLE);
+        let is_plausible = |node: &ScatterNode| node.weight > largest * libm::exp(-NEGLIGIBLE);
         let first = scanned.iter().position(is_plausible).unwrap_or(0);
         let last = scanned.iter().rposition(is_plausible).unwrap_or(SCANNED - 1);
         let range = [first, last + 1].map(|number| number as f64 / SCANNED as f64);
@@ -153,10 +153,10 @@ impl Pooling {
     }
 
     /// Returns nodes in the middle of equal parts of a range of the prior's probability.
-    fn nodes_between(&self, [low, high]: [f64; 2], count: usize) -> Vec<Node> {
+    fn nodes_between(&self, [low, high]: [f64; 2], count: usize) -> Vec<ScatterNode> {
         let step = (high - low) / count as f64;
         let node = |number: usize| self.node((number as f64 + 0.5).mul_add(step, low));
-        let (mut nodes, logarithms): (Vec<Node>, Vec<f64>) = (0..count).map(node).unzip();
+        let (mut nodes, logarithms): (Vec<ScatterNode>, Vec<f64>) = (0..count).map(node).unzip();
         let largest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         for (node, logarithm) in nodes.iter_mut().zip(logarithms) {
             node.weight = libm::exp(logarithm - largest);
@@ -168,7 +168,7 @@ impl Pooling {
 
     /// Returns the node below which the scatter has this prior probability, and the logarithm of the likelihood
     /// of its scatter, with the mean integrated out.
-    fn node(&self, below: f64) -> (Node, f64) {
+    fn node(&self, below: f64) -> (ScatterNode, f64) {
         let scatter = self.prior_quantile(below);
         let precision = |variance: &f64| 1.0 / scatter.mul_add(scatter, *variance);
         let weights: Vec<f64> = self.variances.iter().map(precision).collect();
@@ -185,7 +185,7 @@ impl Pooling {
             0.5 * (libm::log(*weight) - weight * off * off)
         });
         let logarithm = terms.sum::<f64>() - 0.5 * libm::log(sum);
-        let node = Node { below, scatter, weight: 0.0, mean, variance: 1.0 / sum, common };
+        let node = ScatterNode { below, scatter, weight: 0.0, mean, variance: 1.0 / sum, common };
         (node, logarithm)
     }
 
@@ -208,14 +208,14 @@ impl Pooling {
     }
 
     /// Returns how much the mean counts for the value of a group, given a scatter.
-    fn towards_mean(&self, node: &Node, group: usize) -> f64 {
+    fn towards_mean(&self, node: &ScatterNode, group: usize) -> f64 {
         let own = self.variances[group];
         own / node.scatter.mul_add(node.scatter, own)
     }
 
     /// Returns the mean of a group's value given a scatter, its variance if the mean of all were known, and how
     /// much that mean counts.
-    fn given(&self, node: &Node, group: usize) -> (f64, f64, f64) {
+    fn given(&self, node: &ScatterNode, group: usize) -> (f64, f64, f64) {
         let towards = self.towards_mean(node, group);
         let value = self.estimates[group].value;
         let mean = towards.mul_add(node.mean - value, value);
@@ -223,15 +223,15 @@ impl Pooling {
     }
 
     /// Returns what the common errors move the value of a group, given a scatter.
-    fn moved(&self, node: &Node, group: usize) -> Vec<f64> {
+    fn moved(&self, node: &ScatterNode, group: usize) -> Vec<f64> {
         let towards = self.towards_mean(node, group);
         let both = self.estimates[group].common.iter().zip(&node.common);
         both.map(|(own, of_mean)| towards.mul_add(of_mean - own, *own)).collect()
     }
 
     /// Returns the mixture of normal laws with these means and variances.
-    fn mixture(&self, of: impl Fn(&Node) -> (f64, f64)) -> Mixture {
-        let component = |node: &Node| {
+    fn mixture(&self, of: impl Fn(&ScatterNode) -> (f64, f64)) -> Mixture {
+        let component = |node: &ScatterNode| {
             let (mean, variance) = of(node);
             Component { weight: node.weight, mean, deviation: variance.sqrt() }
         };

@@ -14,7 +14,6 @@ use osteon_common::bone::{Bone, CaseBone};
 use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::EngineeringConstants;
 use osteon_common::fluid_sublayers::FluidSublayers;
-use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorPrior, PosteriorSettings,
     Range, Search,
@@ -117,7 +116,7 @@ fn a_minimal_job_has_the_documented_defaults() {
         ]),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
-        groups: GroupSettings::default(),
+        groups: Default::default(),
         monte_carlo: MonteCarlo {
             realizations: 2747,
             seed: 1,

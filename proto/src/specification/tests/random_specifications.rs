@@ -319,14 +319,13 @@ prop_compose! {
             *prior = weight.filter(|_| drawn).map(|weight| Prior { value: range.start(), weight });
         }
         let allowed = data.is_some() && sensitivities && !needs_noise;
-        let systematic = uncertain_offset(allowed, max_failed_fraction);
         let specification = JobSpecification {
             kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
             setup,
             data,
             parameters,
             random,
-            systematic,
+            systematic: uncertain_offset(allowed, max_failed_fraction),
             groups: GroupSettings::default(),
             monte_carlo: MonteCarlo {
                 realizations: points * scrambles.unwrap_or(1),
