@@ -258,10 +258,14 @@ fn documented_is_real(runs: &Runs) {
                 | "other_velocity"
                 | "center_frequency"
                 | "budget"
+                | "pooling"
+                | "pooled"
+                | "errors"
                     if !real.contains(&name) =>
                 {
                     Vec::new()
                 }
+                name if name.contains("_pooled") => Vec::new(),
                 name if of_setup.contains(&name.trim_start_matches("best_")) => Vec::new(),
                 _ => vec![name],
             })

@@ -153,7 +153,7 @@ impl FetchedParts {
         if groups.is_empty() {
             samples.push(of_job);
         } else if let ResultFile::Identification(found) = &mut result {
-            found.groups = Some(groups);
+            found.set_groups(groups);
         }
         let Self { history, .. } = self;
         Ok(Fetched { specification, status, reason: message.reason, result, history, samples })

@@ -5,6 +5,7 @@
 
 mod bone_structure;
 mod data;
+mod groups;
 mod job;
 mod known_quantities;
 mod observables;

@@ -51,6 +51,48 @@ pub struct Inference {
     /// For each quantity with an interval, the share of each source of error in its variance. Empty if the job has
     /// no systematic errors.
     pub budget: Vec<VarianceBudget>,
+    /// Errors of each quantity with an interval, by their sources. Empty unless groups are pooled.
+    pub errors: Vec<QuantityErrors>,
+}
+
+/// A quantity with its errors, on a scale on which they are nearly normal. An error is positive where it moves the
+/// quantity up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QuantityErrors {
+    /// The quantity.
+    pub quantity: BudgetQuantity,
+    /// The scale.
+    pub scale: ErrorScale,
+    /// The value on that scale, corrected for the bias that a coefficient of variation of few velocities has.
+    pub estimate: f64,
+    /// Standard error by the noise of the data.
+    pub data: f64,
+    /// Degrees of freedom behind it: one less than there are independent velocities, or subjects.
+    pub freedom: u64,
+    /// What one standard error by sampling of each compared moment of the model moves it.
+    pub sampling: Vec<f64>,
+    /// What one standard deviation of each quantity of the setup that is not known exactly moves it.
+    pub systematic: Vec<(SystematicQuantity, f64)>,
+}
+
+/// A scale of a quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorScale {
+    /// The natural logarithm of the quantity in its unit.
+    Logarithm,
+    /// The quantity itself.
+    Value,
+}
+
+impl ErrorScale {
+    /// Returns the quantity, given its place on the scale.
+    pub fn quantity_at(self, place: f64) -> f64 {
+        match self {
+            Self::Logarithm => libm::exp(place),
+            Self::Value => place,
+        }
+    }
 }
 
 /// The parts of the variance of a quantity.

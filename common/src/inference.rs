@@ -50,9 +50,9 @@ pub use self::solutions::{solutions, spread};
 pub use self::systematic::systematic_covariance;
 pub use self::weights::{MomentWeights, OBSERVED_PARTS_MIN};
 pub use crate::conclusions::{
-    BudgetQuantity, BudgetSource, Conclusions, DerivedQuantity, Direction, Inference, NoiseErrors,
-    Profile, Sensitivity, Solution, Solutions, Spread, Spreads, Uncertainty, VarianceBudget,
-    VariancePart,
+    BudgetQuantity, BudgetSource, Conclusions, DerivedQuantity, Direction, ErrorScale, Inference,
+    NoiseErrors, Profile, QuantityErrors, Sensitivity, Solution, Solutions, Spread, Spreads,
+    Uncertainty, VarianceBudget, VariancePart,
 };
 pub use crate::data_statistics::CONFIDENCE;
 
@@ -106,6 +106,7 @@ pub fn inference(
         dispersion: context.dispersion(&jacobian.free),
         parameters: context.parameters(&jacobian.free),
         budget: context.budget(&jacobian.free),
+        errors: context.errors(&jacobian.free),
         noise: noise.errors(),
     })
 }

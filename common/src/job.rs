@@ -2,6 +2,7 @@
 
 use crate::case::Setup;
 use crate::fields::{Key, Section};
+use crate::group_settings::GroupSettings;
 use crate::inference::data_noise;
 use crate::moments::MomentMatrix;
 use crate::observables::ObservableSet;
@@ -113,6 +114,8 @@ pub struct JobSpecification {
     pub random: RandomQuantities,
     /// Systematic errors: quantities of the setup that are not known exactly, and wrong in all data alike.
     pub systematic: Systematic,
+    /// What is done with the groups of the data together.
+    pub groups: GroupSettings,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,
     /// The function to be minimised.
@@ -130,6 +133,8 @@ pub struct RunSettings {
     pub random: RandomQuantities,
     /// Systematic errors: quantities of the setup that are not known exactly, and wrong in all data alike.
     pub systematic: Systematic,
+    /// What is done with the groups of the data together.
+    pub groups: GroupSettings,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,
     /// The function to be minimised.
@@ -140,7 +145,7 @@ pub struct RunSettings {
 
 impl RunSettings {
     /// Returns each section with its key, in the order of a canonical file.
-    pub fn sections(&mut self) -> [(Key, &mut dyn Section); 5] {
+    pub fn sections(&mut self) -> [(Key, &mut dyn Section); 6] {
         [
             (
                 Key {
@@ -150,6 +155,7 @@ impl RunSettings {
                 &mut self.random,
             ),
             (Systematic::KEY, &mut self.systematic),
+            (GroupSettings::KEY, &mut self.groups),
             (
                 Key { name: "monte_carlo", meaning: "settings of the Monte Carlo loop" },
                 &mut self.monte_carlo,
@@ -182,8 +188,8 @@ fn has_known_noise(data: &Data) -> bool {
 impl JobSpecification {
     /// Returns the settings of the run.
     pub fn run_settings(&self) -> RunSettings {
-        let &Self { random, systematic, monte_carlo, objective, search, .. } = self;
-        RunSettings { random, systematic, monte_carlo, objective, search }
+        let &Self { random, systematic, groups, monte_carlo, objective, search, .. } = self;
+        RunSettings { random, systematic, groups, monte_carlo, objective, search }
     }
 
     /// Returns the observables that were measured, and that each realization must have therefore.

@@ -246,6 +246,8 @@ pub struct JobResult {
     pub conclusions: Conclusions,
     /// Result for each group of the data; empty if there are no groups.
     pub groups: Vec<GroupResult>,
+    /// Whether the groups share a mean and a scatter.
+    pub pooled: bool,
     /// The function that was minimised; unused by a propagation.
     pub objective: Objective,
     /// Settings of the search; unused by a propagation.

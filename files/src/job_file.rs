@@ -17,6 +17,7 @@ use osteon_common::bone_structure::BoneStructure;
 use osteon_common::case::Setup;
 use osteon_common::check;
 use osteon_common::fields::Section;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     JobKind, JobSpecification, MonteCarlo, Objective, Omitted, PosteriorSettings, Search,
 };
@@ -146,6 +147,7 @@ fn of_tree(
         "parameters",
         "random",
         Systematic::KEY.name,
+        GroupSettings::KEY.name,
         "monte_carlo",
         "objective",
         "search",
@@ -169,6 +171,7 @@ fn of_tree(
         parameters: parameters::read(&mut reader, &table, &setup),
         random: section(&mut reader, &table, "random"),
         systematic: section(&mut reader, &table, Systematic::KEY.name),
+        groups: section(&mut reader, &table, GroupSettings::KEY.name),
         monte_carlo: monte_carlo(&mut reader, &table),
         objective,
         search,

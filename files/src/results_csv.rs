@@ -9,7 +9,7 @@ use osteon_common::outcome::Outcome;
 use osteon_common::parameters::Parameter;
 use osteon_common::results::{Evaluation, Status};
 
-use crate::report::{Group, Moments, QuantityEstimate, QuantityPosterior};
+use crate::report::{Group, Moments, PooledGroups, QuantityEstimate, QuantityPosterior};
 
 /// Returns the text of `history.csv`: one row per evaluation of the search, with the
 /// parameters between its number and its moments; with groups or several starts, also the group and
@@ -102,7 +102,8 @@ pub fn groups(
     // The dispersion has its own columns whether it is free or not.
     let elastic = Parameter::ALL.into_iter().filter(|name| *name != Parameter::Dispersion);
     let free: Vec<Parameter> = elastic.filter(free).collect();
-    let mut out = header(specification, &free);
+    let pooled = pooled_names(specification, &free);
+    let mut out = header(specification, &free, &pooled);
     for (set, group) in groups.iter().enumerate() {
         let best = group.best_point();
         let mut fields = vec![
@@ -120,6 +121,7 @@ pub fn groups(
             |name: Parameter| number(known.get(name).or_else(|| best.map(|point| point.get(name))));
         fields.extend(specification.parameters_given().map(of_best));
         fields.extend(free.iter().flat_map(|&name| identified(name, group)));
+        fields.extend(pooled.iter().flat_map(|name| pooled_fields(name, group)));
         fields.extend(data_fields(group));
         let failed = group.failures.values().copied().fold(0, u64::saturating_add);
         fields.push(best.map_or_else(String::new, |_| failed.to_string()));
@@ -133,8 +135,26 @@ pub fn groups(
     out
 }
 
-/// Returns the header of `groups.csv`, given the free parameters other than the dispersion.
-fn header(specification: &JobSpecification, free: &[Parameter]) -> String {
+/// Returns the names of the quantities that may be pooled, given the free parameters other than the dispersion;
+/// none if the job does not ask for it.
+fn pooled_names(specification: &JobSpecification, free: &[Parameter]) -> Vec<&'static str> {
+    if !specification.groups.pooled {
+        return Vec::new();
+    }
+    let all = ["bulk_velocity", Parameter::Dispersion.name()].into_iter();
+    all.chain(free.iter().map(|parameter| parameter.name())).collect()
+}
+
+/// Returns a pooled value of a group with the ends of its interval.
+fn pooled_fields(name: &str, group: &Group) -> [String; 3] {
+    let pooled = group.pooled.get(name).map(|found| found.pooled);
+    let [lower, upper] = ends(pooled.and_then(|found| found.ends()));
+    [number(pooled.and_then(|found| found.value)), lower, upper]
+}
+
+/// Returns the header of `groups.csv`, given the free parameters other than the dispersion, and the quantities
+/// that may be pooled.
+fn header(specification: &JobSpecification, free: &[Parameter], pooled: &[&str]) -> String {
     let with_interval =
         |name: &str| [name.to_owned(), format!("{name}_lower"), format!("{name}_upper")];
     let single = |name: &str| vec![name.to_owned()];
@@ -144,6 +164,8 @@ fn header(specification: &JobSpecification, free: &[Parameter]) -> String {
     let best = specification.parameters_given().map(|name| format!("best_{}", name.name()));
     let columns = columns.chain(best);
     let columns = columns.chain(free.iter().flat_map(|name| with_interval(name.name())));
+    let pooled = pooled.iter().flat_map(|name| with_interval(&format!("{name}_pooled")));
+    let columns = columns.chain(pooled);
     let data = ["data_mean", "data_coefficient_of_variation"];
     let columns = columns.chain(data.into_iter().flat_map(with_interval));
     let last = ["kolmogorov_distance", "kolmogorov_p_value", "failures", "evaluations", "reason"];
@@ -219,21 +241,31 @@ fn ends(interval: Option<[f64; 2]>) -> [String; 2] {
 /// they are unknown. Each interval has the confidence level of the groups' own intervals.
 ///
 /// The sampling noise, which all groups share, is counted in both groups: intervals tend to be too
-/// wide.
+/// wide. It is not in the differences of the pooled values, which follow if groups are pooled.
 pub fn comparison(groups: &[Group]) -> String {
+    let names = ["bulk_velocity", Parameter::Dispersion.name()];
+    let errors: Vec<_> = groups.iter().map(|group| &group.errors).collect();
+    let is_pooled = groups.iter().any(|group| !group.pooled.is_empty());
+    let pooled: Vec<Option<PooledGroups>> = match is_pooled {
+        true => names.map(|name| PooledGroups::new(&errors, name)).into(),
+        false => Vec::new(),
+    };
+    let columns = names.map(|name| format!("{name}_difference")).into_iter();
+    let columns = columns
+        .chain(names.iter().take(pooled.len()).map(|name| format!("{name}_difference_pooled")));
     let mut out = "first,second".to_owned();
-    for name in ["bulk_velocity", "dispersion"] {
-        out.push_str(&format!(
-            ",{name}_difference,{name}_difference_lower,{name}_difference_upper"
-        ));
-    }
+    columns.for_each(|name| out.push_str(&format!(",{name},{name}_lower,{name}_upper")));
     out.push('\n');
     let firsts = if groups.len() > COMPARED_MAX { 1 } else { groups.len() };
     for (first, one) in groups.iter().enumerate().take(firsts) {
-        for other in &groups[first + 1..] {
+        for (second, other) in groups.iter().enumerate().skip(first + 1) {
             let mut fields = vec![field(&one.name), field(&other.name)];
             for pair in quantities_of(one).into_iter().zip(quantities_of(other)) {
                 fields.extend(difference(pair).map(number));
+            }
+            for pooled in &pooled {
+                let found = pooled.as_ref().and_then(|pooled| pooled.difference(first, second));
+                fields.extend([0, 1, 2].map(|place| number(found.map(|found| found[place]))));
             }
             out.push_str(&fields.join(","));
             out.push('\n');

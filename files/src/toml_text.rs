@@ -9,6 +9,7 @@ use osteon_common::case::{Case, Setup};
 use osteon_common::elasticity::Elasticity;
 use osteon_common::field_path::entry_path;
 use osteon_common::fields::{DeclaredKey, DeclaredValue, Key, Section, entries};
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     Data, Group, JobSpecification, Measurements, PosteriorSettings, Prior, Range, Search,
 };
@@ -344,7 +345,13 @@ fn range(out: &mut String, parameter: Parameter, range: Range) -> fmt::Result {
 }
 
 fn run(out: &mut String, specification: &JobSpecification) -> fmt::Result {
+    // Most data are not grouped, and then its key means nothing.
+    let is_unused =
+        |key: Key| key == GroupSettings::KEY && specification.groups == GroupSettings::default();
     for (key, declared) in specification.run_settings().sections() {
+        if is_unused(key) {
+            continue;
+        }
         writeln!(out)?;
         section(out, key, declared)?;
     }

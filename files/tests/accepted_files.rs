@@ -116,6 +116,7 @@ fn a_minimal_job_has_the_documented_defaults() {
         ]),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: Default::default(),
         monte_carlo: MonteCarlo {
             realizations: 2747,
             seed: 1,

@@ -16,6 +16,8 @@ use support::pin;
 
 #[path = "rejected_jobs/decays.rs"]
 mod decays;
+#[path = "rejected_jobs/groups.rs"]
+mod groups;
 #[path = "rejected_jobs/objective.rs"]
 mod objective;
 #[path = "rejected_jobs/posterior.rs"]

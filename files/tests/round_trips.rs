@@ -18,6 +18,7 @@ use osteon_common::bone::{Bone, CaseBone, Sublayer, Sublayers};
 use osteon_common::bone_structure::BoneStructure;
 use osteon_common::case::{Case, Setup};
 use osteon_common::data::numbered;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, Omitted,
     PosteriorPrior, PosteriorSettings, Prior, PriorDistribution, Range, Sampling, Search,
@@ -318,6 +319,7 @@ fn job() -> impl Strategy<Value = JobSpecification> {
                 parameters,
                 random,
                 systematic,
+                groups: GroupSettings::default(),
                 monte_carlo,
                 objective,
                 search,

@@ -3,6 +3,7 @@
 use osteon_common::bone_structure::BoneStructure;
 use osteon_common::check;
 use osteon_common::data::numbered;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     Data, Group, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, Omitted, Prior,
     Range, Search,
@@ -38,6 +39,8 @@ pub fn to_message(specification: &JobSpecification) -> v1::JobSpecification {
         random: random_to_message(&specification.random),
         systematic: (!specification.systematic.is_empty())
             .then(|| fields::to_message(&mut specification.systematic.clone())),
+        groups: (specification.groups != GroupSettings::default())
+            .then(|| fields::to_message(&mut specification.groups.clone())),
         monte_carlo: Some(fields::to_message(&mut specification.monte_carlo.clone())),
         objective: Some(fields::to_message(&mut specification.objective.clone())),
         search: Some(search_to_message(&specification.search)),
@@ -82,6 +85,10 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
     if let Some(message) = &message.systematic {
         fields::from_message("systematic", message, &mut systematic, violations);
     }
+    let mut groups = GroupSettings::default();
+    if let Some(message) = &message.groups {
+        fields::from_message(GroupSettings::KEY.name, message, &mut groups, violations);
+    }
     let random = message.random.as_ref();
     let random = random
         .map_or_else(RandomQuantities::default, |message| random_from_message(message, violations));
@@ -110,6 +117,7 @@ fn read(message: &v1::JobSpecification, violations: &mut Violations) -> JobSpeci
         setup,
         random,
         systematic,
+        groups,
         monte_carlo,
         objective,
         search: message

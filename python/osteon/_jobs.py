@@ -57,6 +57,7 @@ class Job:
             pores.
         random: scatter of quantities of the setup.
         systematic: what is the same for all data and not known exactly.
+        groups: what is done with the groups of the data together.
         monte_carlo: number of realizations, seed, sampling.
         objective: the function to be minimised.
         search: method and its settings.
@@ -83,6 +84,7 @@ class Job:
         bone: sections.Bone | Mapping[str, Any] | None = None,
         random: sections.Random | Mapping[str, Any] | None = None,
         systematic: sections.Systematic | Mapping[str, Any] | None = None,
+        groups: sections.Groups | Mapping[str, Any] | None = None,
         monte_carlo: sections.MonteCarlo | Mapping[str, Any] | None = None,
         objective: sections.Objective | Mapping[str, Any] | None = None,
         search: sections.Search | Mapping[str, Any] | None = None,
@@ -97,6 +99,7 @@ class Job:
             "parameters": parameters,
             "random": random,
             "systematic": systematic,
+            "groups": groups,
             "monte_carlo": monte_carlo,
             "objective": objective,
             "search": search,

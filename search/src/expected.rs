@@ -76,6 +76,7 @@ fn sampled(specification: &JobSpecification, end: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use osteon_common::case::Setup;
+    use osteon_common::group_settings::GroupSettings;
     use osteon_common::job::{Group, MonteCarlo, Objective, PosteriorSettings, Range, Search};
     use osteon_common::random_quantities::RandomQuantities;
     use osteon_common::systematic::Systematic;
@@ -93,6 +94,7 @@ mod tests {
             parameters: Range::of_bone(free),
             random: RandomQuantities::default(),
             systematic: Systematic::default(),
+            groups: GroupSettings::default(),
             monte_carlo: MonteCarlo::default(),
             objective: Objective::Moments,
             search: Search::by(method),

@@ -424,7 +424,8 @@ impl Summary {
         best: Option<BestPoint>,
         groups: Vec<GroupResult>,
     ) -> JobResult {
-        let data = specification.data.as_ref().filter(|data| !data.is_grouped());
+        let is_grouped = specification.data.as_ref().is_some_and(Data::is_grouped);
+        let data = specification.data.as_ref().filter(|_| !is_grouped);
         let conclusions = data.map(|_| self.conclusions(specification, 0, best.as_ref()));
         let searched = self.history.iter().filter(|row| row.role.is_of_search());
         JobResult {
@@ -436,6 +437,7 @@ impl Summary {
             data: data.map(|data| DataSummary::from_data(data, 0)),
             conclusions: conclusions.unwrap_or_default(),
             groups,
+            pooled: is_grouped && specification.groups.pooled,
             objective: specification.objective,
             search: specification.search,
             evaluations: searched.count() as u64,

@@ -57,6 +57,9 @@ pub(crate) enum Study {
     /// Count how many confidence intervals contain the true value where the data are of another setup than the
     /// job's, with and without `[systematic] usual = true`
     SetupErrors(TwinsArguments),
+    /// Count how many intervals of 3 to 12 bones of eight velocities each contain the true value, each bone alone and
+    /// pooled, and compare the errors
+    Hierarchies(TwinsArguments),
     /// Compare the standard deviations that `osteon design` predicts for five measurements with those of simulated
     /// studies
     Designs(TwinsArguments),

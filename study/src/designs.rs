@@ -1,6 +1,7 @@
 //! What a design predicts, and what identifications of simulated studies then leave open.
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::inference::DerivedQuantity;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, Measurements, MonteCarlo, Objective, PosteriorPrior,
@@ -151,6 +152,7 @@ impl SimulatedPlan {
             parameters,
             random: RandomQuantities::default(),
             systematic,
+            groups: GroupSettings::default(),
             monte_carlo: MonteCarlo {
                 realizations: REALIZATIONS,
                 seed,

@@ -17,6 +17,7 @@ mod draws;
 mod error;
 pub mod failures;
 mod generator;
+pub mod hierarchies;
 mod identify;
 pub mod methods;
 pub mod models;

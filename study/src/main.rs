@@ -18,8 +18,8 @@ use osteon_study::twins::{self, Twins};
 use osteon_study::variance::Repetitions;
 use osteon_study::{
     Draws, MarkdownTable, RowCallback, StudyError, accuracy, continuity, convergence, designs,
-    digest, failures, methods, models, porosities, refinement, searches, setup_errors, setups,
-    signals, stacks, variance,
+    digest, failures, hierarchies, methods, models, porosities, refinement, searches, setup_errors,
+    setups, signals, stacks, variance,
 };
 
 use crate::arguments::{
@@ -96,6 +96,8 @@ const PICKS: OverTwins =
     OverTwins { name: "picks", repetitions: signals::MEASUREMENTS, table: signals::picks };
 const SIGNALS: OverTwins =
     OverTwins { name: "signals", repetitions: signals::STUDIES, table: signals::studies };
+const HIERARCHIES: OverTwins =
+    OverTwins { name: "hierarchies", repetitions: hierarchies::STUDIES, table: hierarchies::table };
 const UNMODELLED_PROFILES: OverTwins =
     OverTwins { name: "unmodelled-profiles", repetitions: 1, table: porosities::unmodelled };
 
@@ -147,6 +149,7 @@ fn run_study(study: Study, isa: Isa) -> Result<String, StudyError> {
         Study::Porosities(arguments) => run_over_twins(&POROSITIES, arguments, isa),
         Study::PorosityProfiles(arguments) => run_over_twins(&POROSITY_PROFILES, arguments, isa),
         Study::SetupErrors(arguments) => run_over_twins(&SETUP_ERRORS, arguments, isa),
+        Study::Hierarchies(arguments) => run_over_twins(&HIERARCHIES, arguments, isa),
         Study::Designs(arguments) => run_over_twins(&DESIGNS, arguments, isa),
         Study::Picks(arguments) => run_over_twins(&PICKS, arguments, isa),
         Study::Signals(arguments) => run_over_twins(&SIGNALS, arguments, isa),

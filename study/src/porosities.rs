@@ -4,6 +4,7 @@
 
 use osteon_common::bone_structure::{BoneStructure, PorosityProfile, ProfileShape};
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::inference::{DerivedQuantity, Uncertainty};
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorSettings, Range, Sampling,
@@ -342,6 +343,7 @@ pub(crate) fn specification(
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo {
             realizations,
             seed,

@@ -11,6 +11,7 @@ mod tests;
 use std::sync::mpsc;
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorSettings, Range, Sampling,
     Search, SearchMethod,
@@ -219,6 +220,7 @@ fn specification(data: Data, monte_carlo: MonteCarlo) -> JobSpecification {
         parameters: Range::of_bone(BOUNDS.map(range)),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo,
         objective: Objective::default(),
         search: Search::by(SearchMethod::Posterior),

@@ -3,6 +3,7 @@
 use std::convert::Infallible;
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search, SearchMethod,
 };
@@ -130,6 +131,7 @@ fn run_search(
         })),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: monte_carlo(draws),
         objective: Objective::default(),
         search,

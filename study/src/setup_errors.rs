@@ -2,6 +2,7 @@
 //! without what is usually not known of a setup.
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::inference::{DerivedQuantity, Inference};
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
@@ -188,6 +189,7 @@ fn specification(setup: &Setup, data: Vec<f64>, usual: bool, seed: u64) -> JobSp
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic { usual, ..Systematic::default() },
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo {
             realizations: REALIZATIONS,
             seed,

@@ -4,6 +4,7 @@
 use std::convert::Infallible;
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::inference::{DerivedQuantity, Inference, Uncertainty};
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
@@ -301,6 +302,7 @@ fn specification(
         parameters: Parameter::ALL.map(range),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo {
             realizations: REALIZATIONS,
             seed,

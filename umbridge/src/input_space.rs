@@ -1,5 +1,6 @@
 //! From the numbers of a request to a point of the job, and to the job of that point.
 
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{JobKind, JobSpecification, Objective, Range, Search};
 use osteon_common::parameters::{AS_IN_SETUP, Parameter, Point};
 use osteon_common::systematic::Systematic;
@@ -147,6 +148,7 @@ impl<'a> InputSpace<'a> {
             parameters,
             random: self.specification.random,
             systematic: Systematic::default(),
+            groups: GroupSettings::default(),
             monte_carlo,
             objective: Objective::Moments,
             search: Search::default(),
@@ -202,6 +204,7 @@ pub(super) mod tests {
             parameters,
             random: RandomQuantities::default(),
             systematic: Systematic::default(),
+            groups: GroupSettings::default(),
             monte_carlo: MonteCarlo::default(),
             objective: Objective::Moments,
             search: Search::default(),

@@ -2,6 +2,7 @@
 
 use osteon_common::case::Setup;
 use osteon_common::digest::PathDigest;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::random_quantities::RandomQuantities;
 use osteon_common::systematic::Systematic;
@@ -39,6 +40,7 @@ fn specification() -> JobSpecification {
         ),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo { realizations: REALIZATIONS, seed: 1, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: Search::default(),

@@ -12,6 +12,7 @@ use crate::violations::Violations;
 
 use super::bone_structure::parameters_of_sublayers;
 use super::data::{data_from, no_data};
+use super::groups::pooled_groups;
 use super::known_quantities::known_quantities;
 use super::observables::observables_of_job;
 use super::posterior::posterior_of_job;
@@ -70,6 +71,7 @@ pub fn job_from(
     observables_of_job(specification, origin, violations);
     posterior_of_job(specification, violations);
     systematic(specification, violations);
+    pooled_groups(specification, violations);
     within_reach(specification, violations);
 }
 

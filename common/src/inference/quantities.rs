@@ -5,7 +5,9 @@ use std::array;
 use super::linear::{Linear, NoiseResponse};
 use super::noise::{NORMAL, Noise};
 use super::systematic::{Effects, contributions, quadratic};
-use crate::conclusions::{BudgetQuantity, DerivedQuantity, Uncertainty, VarianceBudget};
+use crate::conclusions::{
+    BudgetQuantity, DerivedQuantity, ErrorScale, QuantityErrors, Uncertainty, VarianceBudget,
+};
 use crate::data_statistics::{FewIntervals, intervals_of_data};
 use crate::ensemble::DISPERSION_MAX;
 use crate::job::{Data, JobSpecification, Range};
@@ -18,6 +20,10 @@ use crate::results::BestPoint;
 const CLOSED_FORM_ERROR: f64 = 0.01;
 /// Relative error of the e_L at which the closed form has its minimum.
 const LEAST_STIFFNESS_ERROR: f64 = 0.1;
+/// How far the middle of the 95 % interval of ln Δ is above its mean, in variances of ln Δ: (z² - 1)/6 times the
+/// skewness of the logarithm of χ², which is twice the standard deviation of ln Δ (E. A. Cornish, R. A. Fisher,
+/// Rev. Inst. Int. Stat. 5 (1938)), to 5e-3 from four degrees of freedom on.
+const SKEWNESS: f64 = (NORMAL * NORMAL - 1.0) / 3.0;
 
 /// Distances of the ends of the intervals of ln v and ln Δ, below and above.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,6 +99,81 @@ impl Quantities<'_> {
         };
         let all = bulk.into_iter().chain(free.iter().map(parameter));
         all.filter(|budget| !budget.contributions.is_empty()).collect()
+    }
+
+    /// Returns the errors of √(c1111/ρ) and of the free parameters, as far as these are known; none unless groups
+    /// are pooled.
+    pub(super) fn errors(&self, free: &[Parameter]) -> Vec<QuantityErrors> {
+        if !self.specification.groups.pooled {
+            return Vec::new();
+        }
+        let bulk = self.bulk_logarithm(free).and_then(|(logarithm, gradient)| {
+            self.errors_of(
+                BudgetQuantity::BulkVelocity,
+                ErrorScale::Logarithm,
+                logarithm,
+                &gradient,
+            )
+        });
+        let of_parameter = |(parameter, found): (Parameter, DerivedQuantity)| {
+            let DerivedQuantity { value, known } = found;
+            known?;
+            let quantity = BudgetQuantity::Parameter(parameter);
+            let (scale, place, slope) = match parameter.row().scale {
+                ParameterScale::Linear => (ErrorScale::Value, value, 1.0),
+                _ => (ErrorScale::Logarithm, libm::log(value), 1.0 / value),
+            };
+            self.errors_of(quantity, scale, place, &self.along(parameter, free, slope))
+        };
+        let parameters = self.parameters(free).into_iter().filter_map(of_parameter);
+        bulk.into_iter().chain(parameters).collect()
+    }
+
+    /// Returns the errors of a quantity at a place of a scale, with its gradient on that scale.
+    fn errors_of(
+        &self,
+        quantity: BudgetQuantity,
+        scale: ErrorScale,
+        place: f64,
+        gradient: &[f64],
+    ) -> Option<QuantityErrors> {
+        let (NoiseResponse { transfer, .. }, data) = (self.response(gradient)?, self.noise.data?);
+        let (bias, variance) = self.nearly_normal(&transfer, &data.covariance);
+        let left: f64 = transfer.iter().zip(self.residual).map(|(by, left)| by * left).sum();
+        let moved =
+            |effect: &MomentVector| transfer.iter().zip(effect).map(|(by, to)| by * to).sum();
+        let sampling = transfer.iter().zip(self.noise.model).map(|(by, of)| by * of.sqrt());
+        let effects = self.effects.into_iter().flatten();
+        let errors = QuantityErrors {
+            quantity,
+            scale,
+            estimate: place + bias,
+            data: left.mul_add(left, variance).sqrt(),
+            freedom: data.freedom,
+            sampling: sampling.collect(),
+            systematic: effects.map(|(source, effect)| (*source, moved(effect))).collect(),
+        };
+        (errors.estimate.is_finite() && errors.data.is_finite()).then_some(errors)
+    }
+
+    /// Returns what the bias of the coefficient of variation of few data moves a quantity, and its variance by
+    /// the data, from the intervals of the moments where these are not symmetric.
+    fn nearly_normal(&self, transfer: &MomentVector, covariance: &MomentMatrix) -> (f64, f64) {
+        let Some(ends) = &self.ends else {
+            // A standard deviation is too low by half the relative variance of its square, which is twice that
+            // of its logarithm.
+            return (transfer[1] * covariance[1][1], quadratic(transfer, covariance));
+        };
+        let [below, above] = ends.variation;
+        let of_variation = 0.5 * (below + above) / NORMAL;
+        let bias = SKEWNESS.mul_add(-of_variation * of_variation, 0.5 * (above - below));
+        let deviations: MomentVector = array::from_fn(|axis| match axis {
+            0 => ends.mean[0] / self.quantile,
+            1 => of_variation,
+            _ => covariance[axis][axis].sqrt(),
+        });
+        let scaled = array::from_fn(|axis| transfer[axis] * deviations[axis]);
+        (transfer[1] * bias, quadratic(&scaled, &correlations(covariance)))
     }
 
     /// The dispersion, whose interval ends where the law does.
@@ -213,10 +294,7 @@ impl Quantities<'_> {
         ends: &LogarithmicEnds,
         covariance: &MomentMatrix,
     ) -> [f64; 2] {
-        let correlation = |i: usize, j: usize| {
-            let both = covariance[i][j] / (covariance[i][i] * covariance[j][j]).sqrt();
-            if both.is_finite() { both } else { 0.0 }
-        };
+        let correlation = correlations(covariance);
         let ends: [[f64; 2]; MOMENTS] = array::from_fn(|axis| match axis {
             0 => ends.mean,
             1 => ends.variation,
@@ -237,7 +315,7 @@ impl Quantities<'_> {
                 return f64::INFINITY;
             }
             let pairs = (0..MOMENTS).flat_map(|i| (0..i).map(move |j| (i, j)));
-            let both: f64 = pairs.map(|(i, j)| correlation(i, j) * parts[i] * parts[j]).sum();
+            let both: f64 = pairs.map(|(i, j)| correlation[i][j] * parts[i] * parts[j]).sum();
             let own: f64 = parts.iter().map(|part| part * part).sum();
             ((own + 2.0 * both).max(0.0) + NORMAL * NORMAL * beside_data).sqrt()
         })
@@ -253,6 +331,15 @@ impl Quantities<'_> {
         }
         self.linear.response(gradient, &self.noise.covariance())
     }
+}
+
+/// Returns the correlations of moments with this covariance; 0 where a variance is.
+fn correlations(covariance: &MomentMatrix) -> MomentMatrix {
+    let correlation = |i: usize, j: usize| {
+        let both = covariance[i][j] / (covariance[i][i] * covariance[j][j]).sqrt();
+        if both.is_finite() { both } else { 0.0 }
+    };
+    array::from_fn(|i| array::from_fn(|j| correlation(i, j)))
 }
 
 /// Returns the e_L at which c1111 is least, with the other parameters as in `point`: with a = 1 - ν_T and

@@ -6,6 +6,7 @@ use crate::bulk_velocity::bulk_velocity;
 use crate::bulk_velocity::tests::{BOUNDS, OPTIMUM};
 use crate::case::Setup;
 use crate::ensemble::Germs;
+use crate::group_settings::GroupSettings;
 use crate::job::{Data, JobKind, Measurements, MonteCarlo, Objective, Range, Search};
 use crate::observables::PerObservable;
 use crate::outcome::FailureCounts;
@@ -51,6 +52,7 @@ fn specification(free: &[Parameter], velocities: Option<Vec<f64>>) -> JobSpecifi
         })),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),

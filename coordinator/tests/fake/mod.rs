@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::outcomes::Outcomes;
@@ -51,6 +52,7 @@ pub(crate) fn identification(
         })),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo {
             realizations,
             seed,

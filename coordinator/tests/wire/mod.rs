@@ -58,7 +58,7 @@ fn result(parts: &Parts) -> ResultFile {
         && !parts.groups.is_empty()
     {
         let group = |part: &GroupResult| Group::from_json(&part.json).unwrap();
-        found.groups = Some(parts.groups.iter().map(group).collect());
+        found.set_groups(parts.groups.iter().map(group).collect());
     }
     result
 }

@@ -14,10 +14,11 @@ use serde::{Deserialize, Serialize};
 use super::conclusions::{
     Identified, ParameterProfile, QuantityBudget, Solutions, budget, profiles, sensitivities,
 };
+use super::pooling::{PooledEstimate, ScaledErrors, errors, pool};
 use super::schema::{keyed_by_failure, keyed_by_parameter};
 use super::{
-    Data, EstimatedErrors, IntegrityReport, MeanModel, MomentSlopes, PosteriorReport, ReadError,
-    Solver, Velocity, absent_or_nullable, finite_or_null, parse, to_pretty_json,
+    Data, EstimatedErrors, GroupPooling, IntegrityReport, MeanModel, MomentSlopes, PosteriorReport,
+    ReadError, Solver, Velocity, absent_or_nullable, finite_or_null, parse, to_pretty_json,
 };
 
 /// The point that fits the data best, and what the data say of it. Where the data are groups, each
@@ -113,6 +114,9 @@ pub struct Identification {
     /// The result of each group; only where the data are groups.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub groups: Option<Vec<Group>>,
+    /// What the groups share; only where the job asks for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pooling: Option<GroupPooling>,
     /// How the velocities were computed.
     pub solver: Solver<EstimatedErrors>,
     /// The criterion of the first arrival.
@@ -140,6 +144,18 @@ impl Identification {
         self.posterior.as_ref()?.as_ref()
     }
 
+    /// Sets the groups, which are sent one by one, and pools them if the job asks for it.
+    pub fn set_groups(&mut self, mut groups: Vec<Group>) {
+        if let Some(pooling) = &mut self.pooling {
+            let errors: Vec<_> =
+                groups.iter().map(|group| (group.name.as_str(), &group.errors)).collect();
+            let (found, values) = pool(&errors);
+            *pooling = found;
+            groups.iter_mut().zip(values).for_each(|(group, pooled)| group.pooled = pooled);
+        }
+        self.groups = Some(groups);
+    }
+
     /// The derivatives, where they were measured.
     pub fn sensitivities(&self) -> Option<&BTreeMap<Parameter, MomentSlopes>> {
         self.sensitivities.as_ref()?.as_ref()
@@ -156,7 +172,8 @@ impl From<&JobResult> for Identification {
         let single = result.data.as_ref();
         let group = |group| Group::new(result.objective, group);
         let estimated_error = best.and_then(|best| best.estimated_error);
-        Self {
+        let groups = result.groups.iter().map(group).collect();
+        let mut found = Self {
             status: result.status,
             failure: result.failure,
             reason: result.reason.clone(),
@@ -183,14 +200,19 @@ impl From<&JobResult> for Identification {
             profiles: single.map(|_| profiles(conclusions)).unwrap_or_default(),
             solutions: single.and(conclusions.solutions.as_ref()).map(Solutions::from),
             posterior: single.map(|_| conclusions.posterior.as_ref().map(PosteriorReport::from)),
-            groups: single.is_none().then(|| result.groups.iter().map(group).collect()),
+            groups: None,
+            pooling: result.pooled.then(GroupPooling::default),
             solver: Solver::new(&result.solver, result.nominal, estimated_error.into()),
             picking: result.picking,
             version: result.program.version.clone(),
             numerics: result.program.numerics,
             commit: result.program.commit.clone(),
             integrity: IntegrityReport::from_result(result),
+        };
+        if single.is_none() {
+            found.set_groups(groups);
         }
+        found
     }
 }
 
@@ -260,6 +282,13 @@ pub struct Group {
     /// same for all data and not known exactly.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub budget: Vec<QuantityBudget>,
+    /// Values of the quantities with an interval, found with the help of the other groups; only where the job
+    /// asks for it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub pooled: BTreeMap<String, PooledEstimate>,
+    /// Errors of these quantities by their sources.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub errors: BTreeMap<String, ScaledErrors>,
     /// For each free parameter the lowest cost with it held at values from bound to bound.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     #[schemars(transform = keyed_by_parameter)]
@@ -293,6 +322,8 @@ impl Group {
             sensitivities: inference.map(sensitivities),
             identified: inference.map(Identified::from),
             budget: inference.map(budget).unwrap_or_default(),
+            pooled: BTreeMap::new(),
+            errors: inference.map(errors).unwrap_or_default(),
             profiles: profiles(&group.conclusions),
             solutions: group.conclusions.solutions.as_ref().map(Solutions::from),
             posterior: group.conclusions.posterior.as_ref().map(PosteriorReport::from),

@@ -43,6 +43,7 @@ fn found(known: bool) -> Inference {
         dispersion: quantity(0.1029, [0.1, 0.11]),
         parameters: vec![(Parameter::LongitudinalYoungModulus, modulus)],
         budget: Vec::new(),
+        errors: Vec::new(),
     }
 }
 

@@ -74,6 +74,7 @@ fn result() -> JobResult {
         }),
         conclusions: Conclusions::default(),
         groups: Vec::new(),
+        pooled: false,
         objective: Objective::Moments,
         search: Search::default(),
         evaluations: 123,

@@ -3,6 +3,7 @@
 use std::convert::Infallible;
 
 use osteon_common::data::Data;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::inference::Uncertainty;
 use osteon_common::job::{
     JobKind, JobSpecification, MonteCarlo, Objective, Range, Sampling, Search, SearchMethod,
@@ -35,6 +36,7 @@ fn job(free: &[(Parameter, [f64; 2])]) -> JobSpecification {
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo {
             realizations: 128,
             sampling: Sampling::Sobol,

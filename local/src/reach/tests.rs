@@ -1,3 +1,4 @@
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{Data, Group, MonteCarlo, Objective, Search};
 use osteon_common::known_quantities::KnownQuantities;
 use osteon_common::random_quantities::RandomQuantities;
@@ -21,6 +22,7 @@ fn job(data: Data, density: Range) -> JobSpecification {
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),

@@ -2,6 +2,7 @@ use std::path::Path;
 
 use osteon_common::bone_structure::{MeanSolid, MeanSublayer};
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::SearchMethod;
 use osteon_common::settings::Method;
 use osteon_files::document::Format;
@@ -46,6 +47,7 @@ fn message() -> v1::JobSpecification {
         parameters: Range::of_bone(std::array::from_fn(free)),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),

@@ -3,6 +3,7 @@
 use std::convert::Infallible;
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     Data, Group, JobKind, MonteCarlo, Objective, Range, Search as SearchSettings, SearchMethod,
 };
@@ -11,6 +12,7 @@ use osteon_common::results::{EstimatedError, Status};
 use osteon_common::systematic::Systematic;
 
 mod observables;
+mod pooling;
 mod systematic;
 
 use super::*;
@@ -28,6 +30,7 @@ fn specification(data: Data, method: SearchMethod) -> JobSpecification {
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo { realizations: 50, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations: 60, ..SearchSettings::by(method) },

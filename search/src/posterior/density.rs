@@ -49,6 +49,7 @@ impl PosteriorDensity {
 #[cfg(test)]
 mod tests {
     use osteon_common::case::Setup;
+    use osteon_common::group_settings::GroupSettings;
     use osteon_common::job::{
         Data, JobKind, Measurements, MonteCarlo, Objective, PosteriorPrior, PosteriorSettings,
         Range, Search,
@@ -76,6 +77,7 @@ mod tests {
             parameters,
             random: RandomQuantities::default(),
             systematic: Systematic::default(),
+            groups: GroupSettings::default(),
             monte_carlo: MonteCarlo::default(),
             objective: Objective::Moments,
             search: Search::default(),

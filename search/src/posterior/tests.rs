@@ -5,6 +5,7 @@ use osteon_common::bone_structure::BoneStructure;
 use osteon_common::case::Setup;
 use osteon_common::data_likelihood::DataLikelihood;
 use osteon_common::germ_source::sobol_points;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     Data, JobKind, JobSpecification, MonteCarlo, Objective, PosteriorPrior, PosteriorSettings,
     Range, Search,
@@ -107,6 +108,7 @@ fn specification(
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::Moments,
         search: Search::default(),

@@ -1,6 +1,7 @@
 //! Tests of the assessment of outcomes, and of replay.
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     Group, MonteCarlo, Objective, Prior, Range, Sampling, Search as SearchSettings, SearchMethod,
 };
@@ -34,6 +35,7 @@ fn specification(max_evaluations: u64) -> JobSpecification {
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo { realizations: 4, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations, ..SearchSettings::default() },

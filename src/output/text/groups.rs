@@ -4,7 +4,10 @@
 use osteon_common::parameters::Parameter;
 use osteon_common::results::Status;
 use osteon_common::visible;
-use osteon_files::report::{Data, Group, Moment, QuantityEstimate, QuantityPosterior};
+use osteon_files::report::{
+    Data, Group, GroupPooling, Moment, PooledValue, QuantityEstimate, QuantityPosterior,
+    SharedQuantity,
+};
 
 use super::layout::wrapped;
 use super::result::{scale, uncontrolled};
@@ -22,6 +25,15 @@ struct GroupCell {
     ends: Option<[f64; 2]>,
 }
 
+impl GroupCell {
+    fn scaled(self, scale: f64) -> Self {
+        Self {
+            value: self.value.map(|value| value * scale),
+            ends: self.ends.map(|ends| ends.map(|end| end * scale)),
+        }
+    }
+}
+
 impl From<Option<QuantityEstimate>> for GroupCell {
     fn from(found: Option<QuantityEstimate>) -> Self {
         let ends = found.and_then(|found| found.ends());
@@ -35,8 +47,18 @@ impl From<&QuantityPosterior> for GroupCell {
     }
 }
 
-/// Returns the tables of groups, whose job asked for the control variate or did not.
-pub(super) fn table(groups: &[Group], control_variate: bool) -> String {
+impl From<PooledValue> for GroupCell {
+    fn from(found: PooledValue) -> Self {
+        Self { value: found.value, ends: found.ends() }
+    }
+}
+
+/// Returns the tables of groups, and of what they share, whose job asked for the control variate or did not.
+pub(super) fn table(
+    groups: &[Group],
+    pooling: Option<&GroupPooling>,
+    control_variate: bool,
+) -> String {
     let mut text = "\n".to_owned();
     let measured = [
         data(groups, Moment::Mean, "DATA: MEAN VELOCITY (m/s)"),
@@ -53,16 +75,12 @@ pub(super) fn table(groups: &[Group], control_variate: bool) -> String {
         }),
     ];
     text.push_str(&overview(groups));
-    text.push_str(&side_by_side(groups, measured));
-    text.push_str(&side_by_side(groups, identified));
+    let names: Vec<&str> = groups.iter().map(|group| group.name.as_str()).collect();
+    text.push_str(&side_by_side("GROUP", &names, measured));
+    text.push_str(&side_by_side("GROUP", &names, identified));
     let known = known_parameters(groups);
-    for pair in known.chunks(2) {
-        let none = || Column { heading: String::new(), cells: Vec::new() };
-        let column = |parameter: Option<&Parameter>| {
-            parameter.map_or_else(none, |parameter| of_parameter(groups, *parameter))
-        };
-        text.push_str(&side_by_side(groups, [column(pair.first()), column(pair.get(1))]));
-    }
+    let columns = known.into_iter().map(|parameter| of_parameter(groups, parameter));
+    text.push_str(&in_pairs("GROUP", &names, columns));
     let of_posterior = groups.iter().any(|group| group.posterior.is_some());
     let intervals = if of_posterior {
         "confidence intervals of the data, and 95 % intervals of the posterior"
@@ -71,6 +89,7 @@ pub(super) fn table(groups: &[Group], control_variate: bool) -> String {
     };
     let brackets = wrapped(&format!("In brackets: 95 % {intervals}, each group by itself."));
     text.push_str(&format!("\n{brackets}"));
+    text.push_str(&pooling.map_or_else(String::new, |pooling| pooled(groups, pooling)));
     text.push_str(&notes(groups, control_variate));
     text.push_str(&caveat(groups));
     text
@@ -92,15 +111,57 @@ fn overview(groups: &[Group]) -> String {
     format!("\n{}", aligned(&rows))
 }
 
-fn side_by_side(groups: &[Group], columns: [Column; 2]) -> String {
+/// Returns tables of two columns each, below each other.
+fn in_pairs(heading: &str, names: &[&str], columns: impl Iterator<Item = Column>) -> String {
+    let (mut columns, mut text) = (columns, String::new());
+    while let Some(first) = columns.next() {
+        let none = || Column { heading: String::new(), cells: Vec::new() };
+        text.push_str(&side_by_side(heading, names, [first, columns.next().unwrap_or_else(none)]));
+    }
+    text
+}
+
+fn side_by_side(heading: &str, names: &[&str], columns: [Column; 2]) -> String {
     let mut rows =
-        vec![["GROUP".to_owned(), columns[0].heading.clone(), columns[1].heading.clone()]];
+        vec![[heading.to_owned(), columns[0].heading.clone(), columns[1].heading.clone()]];
     let [first, second] = columns.map(|column| shown(&column.cells));
-    for (at, group) in groups.iter().enumerate() {
+    for (at, name) in names.iter().enumerate() {
         let cell = |cells: &[String]| cells.get(at).cloned().unwrap_or_default();
-        rows.push([group.name.clone(), cell(&first), cell(&second)]);
+        rows.push([(*name).to_owned(), cell(&first), cell(&second)]);
     }
     format!("\n{}", aligned(&rows))
+}
+
+/// Returns the tables of what groups share.
+fn pooled(groups: &[Group], pooling: &GroupPooling) -> String {
+    if let Some(reason) = &pooling.reason {
+        return format!("\n{}", wrapped(&visible::line(&format!("Not pooled: {reason}."))));
+    }
+    let is_pooled = |group: &&Group| !group.pooled.is_empty();
+    let members: Vec<&Group> = groups.iter().filter(is_pooled).collect();
+    let names = members.iter().map(|group| group.name.as_str());
+    let names: Vec<&str> = names.chain(["mean of all", "scatter"]).collect();
+    let column = |(name, shared): (&String, &SharedQuantity)| {
+        let cells = members.iter().map(|group| group.pooled.get(name).map(|one| one.pooled));
+        let cells = cells.chain([Some(shared.mean), Some(shared.scatter)]);
+        let (heading, scale) = match Parameter::ALL.into_iter().find(|one| one.name() == name) {
+            None => ("√(c1111/ρ) (m/s)".to_owned(), 1.0),
+            Some(parameter) => (heading(parameter), scale(parameter).0),
+        };
+        let none = GroupCell { value: None, ends: None };
+        let cells = cells.map(|cell| cell.map_or(none, GroupCell::from).scaled(scale));
+        Column { heading, cells: cells.collect() }
+    };
+    let mut text = in_pairs("POOLED", &names, pooling.quantities.iter().map(column));
+    let what = "Pooled: each group with the help of all others; mean and scatter are those of the true values of \
+                all groups like these.";
+    text.push_str(&format!("\n{}", wrapped(what)));
+    if !pooling.left_out.is_empty() {
+        let names = pooling.left_out.join(", ");
+        let left = format!("Not pooled, without an interval of their own: {names}.");
+        text.push_str(&wrapped(&visible::line(&left)));
+    }
+    text
 }
 
 /// Returns the column of a moment of the data.
@@ -119,22 +180,21 @@ fn quantities(
     scale: f64,
     of: impl Fn(&Group) -> GroupCell,
 ) -> Column {
-    let cell = |group| {
-        let GroupCell { value, ends } = of(group);
-        GroupCell {
-            value: value.map(|value| value * scale),
-            ends: ends.map(|ends| ends.map(|end| end * scale)),
-        }
-    };
+    let cell = |group| of(group).scaled(scale);
     Column { heading: heading.to_owned(), cells: groups.iter().map(cell).collect() }
 }
 
 fn of_parameter(groups: &[Group], parameter: Parameter) -> Column {
-    let (scale, unit) = scale(parameter);
+    quantities(groups, &heading(parameter), scale(parameter).0, |group| known(group, parameter))
+}
+
+/// Returns the heading of the column of a parameter.
+fn heading(parameter: Parameter) -> String {
     let heading = parameter.name().replace('_', " ").to_uppercase();
-    let unit = unit.trim();
-    let heading = if unit.is_empty() { heading } else { format!("{heading} ({unit})") };
-    quantities(groups, &heading, scale, |group| known(group, parameter))
+    match scale(parameter).1.trim() {
+        "" => heading,
+        unit => format!("{heading} ({unit})"),
+    }
 }
 
 /// Returns what the data of a group say of a parameter.

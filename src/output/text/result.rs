@@ -62,7 +62,9 @@ fn summary(shown: &ShownResult<'_>) -> String {
         ResultFile::Identification(found) => {
             let headline = headline(found, specification);
             if let Some(groups) = &found.groups {
-                return format!("{headline}{}", groups::table(groups, found.control_variate));
+                let pooling = found.pooling.as_ref();
+                let table = groups::table(groups, pooling, found.control_variate);
+                return format!("{headline}{table}");
             }
             let point = found.cost.and_then(|_| found.parameters.point(found.dispersion));
             let Some(point) = point else { return headline };
@@ -96,7 +98,7 @@ fn identification(text: &mut String, found: &Identification, shown: &ShownResult
             of_posteriors => count.push_str(&format!(" and {of_posteriors} for the posteriors")),
         }
         text.push_str(&count);
-        text.push_str(&groups::table(groups, found.control_variate));
+        text.push_str(&groups::table(groups, found.pooling.as_ref(), found.control_variate));
         return;
     }
     // A point without a finite cost allows no statement about the data.

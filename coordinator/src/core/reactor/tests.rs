@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::outcome::{Outcome, RealizationResult};
 use osteon_common::random_quantities::RandomQuantities;
@@ -144,6 +145,7 @@ fn propagation(realizations: u64) -> JobSpecification {
         ),
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo { realizations, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: Search::default(),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{Data, JobKind, MonteCarlo, Objective, Range, Search as SearchSettings};
 use osteon_common::outcomes::Outcomes;
 use osteon_common::random_quantities::RandomQuantities;
@@ -37,6 +38,7 @@ pub(crate) fn ended() -> (JobRecord, Search, EndRecord, EvaluationRecord) {
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo { realizations: 2, ..MonteCarlo::default() },
         objective: Objective::default(),
         search: SearchSettings { max_evaluations: 8, ..SearchSettings::default() },

@@ -5,6 +5,7 @@ use std::fs;
 use std::sync::Arc;
 
 use osteon_common::case::Setup;
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 use osteon_common::observables::{Observable, ObservedValues, PerObservable};
 use osteon_common::outcome::{FailureCounts, FailureKind};
@@ -36,6 +37,7 @@ pub(super) fn job(id: u64) -> JobRecord {
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),
+        groups: GroupSettings::default(),
         monte_carlo: MonteCarlo::default(),
         objective: Objective::default(),
         search: Search::default(),

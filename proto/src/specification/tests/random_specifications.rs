@@ -5,6 +5,7 @@ use osteon_common::bone_structure::{
 };
 use osteon_common::case::Setup;
 use osteon_common::fluid_sublayers::{FluidSublayer, FluidSublayers};
+use osteon_common::group_settings::GroupSettings;
 use osteon_common::job::{
     PosteriorPrior, PosteriorSettings, PriorDistribution, Sampling, SearchMethod,
 };
@@ -318,14 +319,14 @@ prop_compose! {
             *prior = weight.filter(|_| drawn).map(|weight| Prior { value: range.start(), weight });
         }
         let allowed = data.is_some() && sensitivities && !needs_noise;
-        let systematic = uncertain_offset(allowed, max_failed_fraction);
         let specification = JobSpecification {
             kind: if data.is_some() { JobKind::Identification } else { JobKind::Propagation },
             setup,
             data,
             parameters,
             random,
-            systematic,
+            systematic: uncertain_offset(allowed, max_failed_fraction),
+            groups: GroupSettings::default(),
             monte_carlo: MonteCarlo {
                 realizations: points * scrambles.unwrap_or(1),
                 seed,

@@ -16,7 +16,7 @@ fn table(groups: &[Value]) -> String {
         put(&mut value, partial);
         serde_json::from_value(value).unwrap()
     };
-    super::table(&groups.iter().map(group).collect::<Vec<_>>(), true)
+    super::table(&groups.iter().map(group).collect::<Vec<_>>(), None, true)
 }
 
 fn quantity(value: f64, interval: [f64; 2]) -> Value {

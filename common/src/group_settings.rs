@@ -1,0 +1,28 @@
+//! What is done with groups of data together.
+
+use crate::fields::{Fields, Key, Section};
+
+/// What is done with the groups of the data together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct GroupSettings {
+    /// Whether the groups share a mean and a scatter.
+    pub pooled: bool,
+}
+
+impl GroupSettings {
+    /// Its section of a job file.
+    pub const KEY: Key =
+        Key { name: "groups", meaning: "what is done with the groups of the data together" };
+    /// Name of the key that makes groups share a mean and a scatter.
+    pub const POOLED: &str = "pooled";
+}
+
+impl Section for GroupSettings {
+    fn declare(&mut self, fields: &mut dyn Fields) {
+        let meaning = "true: after each group has been identified by itself, the groups share a mean and a scatter \
+                       of each quantity, so that a group of few velocities learns from the others \
+                       ([searches.md](searches.md#groups-that-share-a-mean)); needs at least three groups of five \
+                       velocities, or subjects, and derivatives";
+        fields.boolean(Key { name: Self::POOLED, meaning }, &mut self.pooled);
+    }
+}
