@@ -163,7 +163,7 @@ const VERBS: &[Verb] = &[
     },
     Verb {
         name: "release",
-        what: "* all files of a release, tried: wheels, archives, .deb, SBOM, sums; --help lists the options",
+        what: "all files of a release, tried: wheels, archives, .deb, SBOM, sums; --help lists the options",
         action: Some(Action::Function(release::make)),
         parts: &[],
     },
@@ -268,7 +268,6 @@ const CI: &[&[&str]] = &[
     &["test", "umbridge"],
     &["test", "deploy"],
     &["test", "slurm", slurm::IF_INSTALLED],
-    release::TRIAL,
 ];
 
 fn main() -> ExitCode {

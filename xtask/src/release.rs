@@ -7,9 +7,6 @@ use crate::places::programs;
 use crate::process::cargo;
 use crate::python::{WHEELS, python};
 
-/// What CI makes: the files for x86-64 of the tree as it is, by the profile that is built soonest.
-pub(crate) const TRIAL: &[&str] = &["release", "x86_64", "--profile", "dev", "--dirty"];
-
 /// Makes all files of a release, or those for the processors that `words` name, and tries them. Uses
 /// `python3`, or the interpreter named by the variable `PYTHON`.
 pub(crate) fn make(words: &[String]) -> Result<()> {
