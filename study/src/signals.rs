@@ -119,15 +119,18 @@ impl PickErrors {
     }
 
     fn cells(&self) -> Vec<String> {
-        let picked = self.picked.max(1) as f64;
-        vec![
-            self.all.to_string(),
-            (self.all - self.picked).to_string(),
-            format!("{:+.2}", self.sum / picked),
-            format!("{:.2}", (self.squares / picked).sqrt()),
-            format!("{:.1}", 100.0 * self.held as f64 / picked),
-            self.wrong.to_string(),
-        ]
+        let picked = self.picked as f64;
+        let counts = [self.all.to_string(), (self.all - self.picked).to_string()];
+        let of_picked = match self.picked {
+            0 => ["–"; 4].map(str::to_owned),
+            _ => [
+                format!("{:+.2}", self.sum / picked),
+                format!("{:.2}", (self.squares / picked).sqrt()),
+                format!("{:.1}", 100.0 * self.held as f64 / picked),
+                self.wrong.to_string(),
+            ],
+        };
+        [&counts[..], &of_picked].concat()
     }
 }
 
