@@ -73,7 +73,8 @@ fn level_of_elements(length: f64, wave_number: f64, distance: f64) -> f64 {
         real += weight * (length - s) * cos;
         imaginary += weight * (length - s) * sin;
     }
-    0.5 * libm::log((real * real + imaginary * imaginary) / distance)
+    let square = step * step * (real * real + imaginary * imaginary);
+    0.5 * libm::log(square / distance)
 }
 
 /// Returns the least-squares slope of values at these places.
@@ -110,7 +111,10 @@ mod tests {
         let point = Spreading::Point.decay(&Probe::default(), 3900.0);
         check(Spreading::Elements(0.3e-3), point, 2e-3);
         check(Spreading::Elements(0.1), 0.0, 0.05);
-        check(Spreading::Elements(8e-3), 0.5 * point, 0.45 * point);
+        // By 4,000 intervals.
+        check(Spreading::Elements(4e-3), 2.5960, 1e-3);
+        check(Spreading::Elements(8e-3), 0.7651, 1e-3);
+        check(Spreading::Elements(20e-3), 0.2149, 1e-3);
     }
 
     #[test]
