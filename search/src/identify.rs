@@ -99,6 +99,7 @@ pub enum IdentifyError<E> {
 /// use std::convert::Infallible;
 ///
 /// use osteon_common::case::Setup;
+/// use osteon_common::group_settings::GroupSettings;
 /// use osteon_common::job::{Data, JobKind, JobSpecification, MonteCarlo, Objective, Range, Search};
 /// use osteon_common::outcome::RealizationResult;
 /// use osteon_common::random_quantities::RandomQuantities;
@@ -115,6 +116,7 @@ pub enum IdentifyError<E> {
 ///     parameters,
 ///     random: RandomQuantities::default(),
 ///     systematic: Systematic::default(),
+///     groups: GroupSettings::default(),
 ///     monte_carlo: MonteCarlo { realizations: 100, ..MonteCarlo::default() },
 ///     objective: Objective::Moments,
 ///     search: Search::default(),
