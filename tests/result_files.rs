@@ -314,7 +314,9 @@ fn committed_schema(file: &str) -> Value {
         fs::write(&path, printed.succeeded()).unwrap();
     }
     let committed = fs::read_to_string(path).unwrap();
-    assert_eq!(printed.succeeded(), committed, "after a change: cargo xtask generate reference");
+    // The texts are too long to be shown.
+    let is_committed = printed.succeeded() == committed;
+    assert!(is_committed, "docs/{file}.schema.json is old: cargo xtask generate reference");
     let schema: Value = serde_json::from_str(&committed).unwrap();
     assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
     schema

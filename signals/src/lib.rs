@@ -15,6 +15,7 @@ mod array_signals;
 mod band_filter;
 mod consensus;
 mod direction;
+mod dot;
 mod interpolation;
 mod moveout_fit;
 mod pick_failure;

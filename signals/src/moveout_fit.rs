@@ -5,7 +5,7 @@
 //! follows this; what is left is error. A receiver without a time gets the parabola's, so that the velocity is
 //! that of the whole array.
 
-use osteon_solver::picking::{mean, slope};
+use osteon_common::line_fit::{mean, slope};
 
 /// A time off the parabola by more than this multiple of its standard error is rejected.
 const OUTLIER: f64 = 4.5;

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use osteon_solver::picking::{PACKET_PERIODS, Window, mean};
+use osteon_common::line_fit::mean;
+use osteon_solver::picking::{PACKET_PERIODS, Window};
 
 use crate::band_filter::BandFilter;
 use crate::interpolation::{self, CurvedExtremum, HALF_WIDTH, SampleSlopes};
@@ -76,9 +77,11 @@ impl ReceiverSignal {
     ) -> Self {
         let clipped_from = first_clipped(raw, 1.0 / (span.center_frequency * step), full_scale)
             .map_or(f64::INFINITY, |index| (index as f64).mul_add(step, start));
-        let mut samples = match filter {
-            Some(filter) => interpolation::continued(&filter.apply(raw)),
-            None => interpolation::continued(raw),
+        let (mut samples, step) = match filter {
+            Some(filter) => {
+                (interpolation::continued(&filter.apply(raw)), filter.stride() as f64 * step)
+            }
+            None => (interpolation::continued(raw), step),
         };
         let start = (HALF_WIDTH as f64).mul_add(-step, start);
         let index = |time: f64| ((time - start) / step).clamp(0.0, samples.len() as f64) as usize;
@@ -174,7 +177,7 @@ pub(crate) fn of_one_kind(samples: &[f64], range: Range<usize>) -> Range<usize> 
 
 /// Returns the root of the mean square.
 fn deviation(values: &[f64]) -> f64 {
-    let square = values.iter().fold(0.0, |sum: f64, value| value.mul_add(*value, sum));
+    let square = values.iter().fold(0.0, |sum: f64, value| sum + value * value);
     (square / values.len().max(1) as f64).sqrt()
 }
 

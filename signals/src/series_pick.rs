@@ -1,8 +1,8 @@
 //! The velocity of one measurement, from one source or both.
 
+use osteon_common::line_fit::mean;
 use osteon_common::signal_layout::Transmitter;
 use osteon_files::probe_file::ProbeDescription;
-use osteon_solver::picking::mean;
 
 use crate::array_decision::PickRefusal;
 use crate::array_geometry::ArrayGeometry;

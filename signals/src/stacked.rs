@@ -8,6 +8,7 @@ use osteon_solver::picking::{FLOOR, PressureExtremum, Window};
 
 use crate::array_geometry::ArrayGeometry;
 use crate::consensus::MoveoutLine;
+use crate::dot::dot;
 use crate::interpolation::CurvedExtremum;
 use crate::receiver_signal::{NOISE_FLOOR, ReceiverSignal};
 
@@ -15,7 +16,7 @@ use crate::receiver_signal::{NOISE_FLOOR, ReceiverSignal};
 /// rest of the packet.
 const PERIODS: (f64, f64) = (-3.0, 2.2);
 /// Steps in a period.
-const STEPS_PER_PERIOD: f64 = 64.0;
+const STEPS_PER_PERIOD: f64 = 32.0;
 /// Largest distance of a receiver's extremum from the common one, in periods: half of the time to the next of
 /// the other sign.
 const MATCH_PERIODS: f64 = 0.25;
@@ -27,7 +28,7 @@ const DELAY_PERIODS: f64 = 1.6;
 /// Largest delay, in periods, that is none.
 const PUNCTUAL_PERIODS: f64 = 0.25;
 /// Steps between the values that are compared.
-const COMPARED_STEP: usize = 4;
+const COMPARED_STEP: usize = 2;
 /// Smallest size of an extremum that is matched, in standard deviations of the noise. It may be below that which
 /// opens a packet, because it is known where to look.
 const MATCHED_NOISE: f64 = 3.0;
@@ -178,12 +179,7 @@ pub(crate) struct Likeness {
 }
 
 fn correlation(one: &[f64], other: &[f64]) -> f64 {
-    let (mut cross, mut own, mut common) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for (a, b) in one.iter().zip(other) {
-        cross = a.mul_add(*b, cross);
-        own = a.mul_add(*a, own);
-        common = b.mul_add(*b, common);
-    }
+    let (cross, own, common) = (dot(one, other), dot(one, one), dot(other, other));
     if own > 0.0 && common > 0.0 { cross / (own * common).sqrt() } else { 0.0 }
 }
 

@@ -177,7 +177,7 @@ fn two_directions_cancel_a_tilt() {
     setup.probe.tilt = 0.0175;
     setup.probe.bidirectional = true;
     let both = [Transmitter::First, Transmitter::Second];
-    let series = SignalSeries { directions: both.map(|one| signals(&setup, one)).to_vec() };
+    let series = SignalSeries { directions: both.map(|one| signals(&setup, one, 2e-8)).to_vec() };
     let mut probe = description(None);
     probe.setup = setup.clone();
     probe.signals.transmitters = both.to_vec();
@@ -206,7 +206,7 @@ fn without_noise_the_velocity_is_the_models() {
         .arrival(&CASE.bone, &mut Workspace::default())
         .unwrap()
         .velocity;
-    let series = SignalSeries { directions: vec![signals(&setup, Transmitter::First)] };
+    let series = SignalSeries { directions: vec![signals(&setup, Transmitter::First, 2e-8)] };
     let found = pick(&description(None), &series).estimate.unwrap();
     assert!((found.velocity / expected - 1.0).abs() < 1e-6, "{} {expected}", found.velocity);
     assert!(found.quality > 0.99);

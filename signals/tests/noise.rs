@@ -4,7 +4,9 @@
 
 mod support;
 
-use support::{CLEAN, description, packet_peak, pick, with_noise};
+use osteon_common::signal_layout::Transmitter;
+use osteon_signals::SignalSeries;
+use support::{CASE, CLEAN, description, packet_peak, pick, signals, with_noise};
 
 /// What many noisy series give.
 #[derive(Debug)]
@@ -20,14 +22,14 @@ struct Account {
     wrong: usize,
 }
 
-fn account(decibels: f64, count: u64) -> Account {
-    let exact = pick(&description(None), &CLEAN).estimate.unwrap().velocity;
-    let deviation = packet_peak(&CLEAN) * libm::pow(10.0, -decibels / 20.0);
+fn account(clean: &SignalSeries, decibels: f64, count: u64) -> Account {
+    let exact = pick(&description(None), clean).estimate.unwrap().velocity;
+    let deviation = packet_peak(clean) * libm::pow(10.0, -decibels / 20.0);
     let probe = description(Some([0.0, 2.5e6]));
     let (mut found, mut account) =
         (0.0, Account { bias: 0.0, standard_error: 0.0, coverage: 0.0, refused: 0, wrong: 0 });
     for seed in 0..count {
-        let Ok(estimate) = pick(&probe, &with_noise(&CLEAN, deviation, seed)).estimate else {
+        let Ok(estimate) = pick(&probe, &with_noise(clean, deviation, seed)).estimate else {
             account.refused += 1;
             continue;
         };
@@ -44,8 +46,8 @@ fn account(decibels: f64, count: u64) -> Account {
     account
 }
 
-fn check(decibels: f64, bias_max: f64, refused_max: usize) {
-    let account = account(decibels, 400);
+fn check(clean: &SignalSeries, decibels: f64, bias_max: f64, refused_max: usize) {
+    let account = account(clean, decibels, 400);
     assert!(account.bias.abs() <= bias_max, "{decibels} dB: {account:?}");
     assert!((0.93..=0.97).contains(&account.coverage), "{decibels} dB: {account:?}");
     assert!(account.refused <= refused_max && account.wrong == 0, "{decibels} dB: {account:?}");
@@ -53,16 +55,24 @@ fn check(decibels: f64, bias_max: f64, refused_max: usize) {
 
 #[test]
 fn at_40_decibels_intervals_hold() {
-    check(40.0, 1.0, 0);
+    check(&CLEAN, 40.0, 1.0, 0);
 }
 
 #[test]
 fn at_30_decibels_the_bias_is_small_and_intervals_hold() {
-    check(30.0, 2.0, 0);
+    check(&CLEAN, 30.0, 2.0, 0);
 }
 
 /// The first extremum is a sixth of the packet's peak, here not much more than the noise.
 #[test]
 fn at_20_decibels_intervals_hold() {
-    check(20.0, 8.0, 40);
+    check(&CLEAN, 20.0, 8.0, 40);
+}
+
+/// Of signals that are sampled this finely the filter keeps every sixth value. Their noise has the same size in
+/// each sample, most of it above the band.
+#[test]
+fn finely_sampled_signals_lose_nothing() {
+    let fine = signals(&CASE.setup, Transmitter::First, 4e-9);
+    check(&SignalSeries { directions: vec![fine] }, 20.0, 2.0, 0);
 }

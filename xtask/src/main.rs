@@ -80,6 +80,7 @@ const LINT_TRACING: Cargo = &[
 
 const BENCH: &[Cargo] = &[
     &["bench", "--package", "osteon-solver", "--bench", "table"],
+    &["bench", "--package", "osteon-signals", "--bench", "picking"],
     &["bench", "--package", "osteon", "--bench", "end_to_end"],
     &["bench", "--package", "osteon", "--bench", "dispatch"],
     &["bench", "--package", "osteon", "--bench", "jobs"],

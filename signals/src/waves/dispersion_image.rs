@@ -3,7 +3,6 @@
 use std::f64::consts::PI;
 
 use osteon_common::case::Setup;
-use osteon_common::signal_layout::Transmitter;
 use osteon_files::probe_file::ProbeDescription;
 
 use super::response_matrix::SideSignals;
@@ -76,12 +75,7 @@ impl DispersionImage {
         description: &ProbeDescription,
         series: &SignalSeries,
     ) -> Result<(), WaveFailure> {
-        let ProbeDescription { setup, signals, waves } = description;
-        let sides = Transmitter::ALL
-            .into_iter()
-            .filter_map(|side| SideSignals::new(setup, signals.full_scale, side, series));
-        let sides = sides.collect::<Result<Vec<_>, _>>()?;
-        for side in sides {
+        for side in SideSignals::of_series(description, series)? {
             let responses: Vec<_> =
                 self.grid.frequencies.iter().map(|f| side.response(*f)).collect();
             let sizes: Vec<f64> = responses.iter().map(|response| response.size()).collect();
@@ -92,7 +86,8 @@ impl DispersionImage {
                 if size <= least {
                     continue;
                 }
-                let space = SignalSubspace::new(&side.positions, response, waves.threshold);
+                let space =
+                    SignalSubspace::new(&side.positions, response, description.waves.threshold);
                 for (sum, k) in sums.iter_mut().zip(&self.grid.wavenumbers) {
                     *sum += space.norm(*k);
                 }

@@ -3,7 +3,6 @@
 use std::f64::consts::PI;
 
 use osteon_common::observables::Observable;
-use osteon_common::signal_layout::Transmitter;
 use osteon_files::probe_file::ProbeDescription;
 
 use super::response_matrix::SideSignals;
@@ -114,11 +113,7 @@ impl WaveFinder {
         if self.targets.is_empty() {
             return Vec::new();
         }
-        let ProbeDescription { setup, signals, .. } = &self.description;
-        let sides = Transmitter::ALL
-            .into_iter()
-            .filter_map(|side| SideSignals::new(setup, signals.full_scale, side, series));
-        let sides: Result<Vec<_>, _> = sides.collect();
+        let sides = SideSignals::of_series(&self.description, series);
         let estimate = |target: &WaveTarget| {
             let sides = sides.as_ref().map_err(|failure| *failure)?;
             let found = sides.iter().map(|side| self.wavenumber(side, target));

@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use osteon_common::case::Setup;
+use osteon_common::line_fit::mean;
 use osteon_common::signal_layout::Transmitter;
+use osteon_files::probe_file::ProbeDescription;
 use osteon_solver::Complex;
-use osteon_solver::picking::mean;
 
 use super::wave_failure::WaveFailure;
 use crate::array_geometry::ArrayGeometry;
@@ -49,8 +50,21 @@ pub(super) struct ResponseMatrix {
 }
 
 impl<'a> SideSignals<'a> {
+    /// Returns the signals of a series by the sides on which their sources are.
+    ///
+    /// # Errors
+    /// If those of a side cannot be used.
+    pub(super) fn of_series(
+        description: &ProbeDescription,
+        series: &'a SignalSeries,
+    ) -> Result<Vec<Self>, WaveFailure> {
+        let ProbeDescription { setup, signals, .. } = description;
+        let of_side = |side| Self::of_side(setup, signals.full_scale, side, series);
+        Transmitter::ALL.into_iter().filter_map(of_side).collect()
+    }
+
     /// Takes the signals of a series whose sources are on one side; `None` if there are none.
-    pub(super) fn new(
+    fn of_side(
         setup: &Setup,
         full_scale: Option<f64>,
         side: Transmitter,

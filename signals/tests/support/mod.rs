@@ -18,16 +18,16 @@ pub(crate) static CASE: LazyLock<Case> = LazyLock::new(|| {
     case_file::read(&path).unwrap()
 });
 /// Its signals.
-pub(crate) static CLEAN: LazyLock<SignalSeries> =
-    LazyLock::new(|| SignalSeries { directions: vec![signals(&CASE.setup, Transmitter::First)] });
+pub(crate) static CLEAN: LazyLock<SignalSeries> = LazyLock::new(|| SignalSeries {
+    directions: vec![signals(&CASE.setup, Transmitter::First, 2e-8)],
+});
 
-/// Solves the case's bone for one source of a setup; samples every 20 ns.
-pub(crate) fn signals(setup: &Setup, transmitter: Transmitter) -> ArraySignals {
+/// Solves the case's bone for one source of a setup; samples every `step`, s.
+pub(crate) fn signals(setup: &Setup, transmitter: Transmitter, step: f64) -> ArraySignals {
     let mut setup = setup.clone();
     if transmitter == Transmitter::Second {
         setup.probe = setup.probe.from_other_side();
     }
-    let step = 2e-8;
     let solver = Solver::with_isa(&setup, Isa::fastest());
     let mut receivers = solver.traces(&CASE.bone, 16e-6, step).unwrap().pressures;
     if transmitter == Transmitter::Second {
