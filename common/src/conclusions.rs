@@ -69,9 +69,9 @@ pub struct QuantityErrors {
     pub data: f64,
     /// Degrees of freedom behind it: one less than there are independent velocities, or subjects.
     pub freedom: u64,
-    /// What one standard error by sampling of each compared moment of the model moves it.
+    /// Change of the estimate by one standard error of each compared moment of the model, which sampling makes.
     pub sampling: Vec<f64>,
-    /// What one standard deviation of each quantity of the setup that is not known exactly moves it.
+    /// Change of the estimate by one standard deviation of each uncertain quantity of the setup.
     pub systematic: Vec<(SystematicQuantity, f64)>,
 }
 

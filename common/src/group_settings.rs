@@ -1,8 +1,8 @@
-//! What is done with groups of data together.
+//! Settings of pooling: whether the results of groups inform each other.
 
 use crate::fields::{Fields, Key, Section};
 
-/// What is done with the groups of the data together.
+/// The section `[groups]` of a job file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GroupSettings {
     /// Whether the groups share a mean and a scatter.
@@ -12,7 +12,7 @@ pub struct GroupSettings {
 impl GroupSettings {
     /// Its section of a job file.
     pub const KEY: Key =
-        Key { name: "groups", meaning: "what is done with the groups of the data together" };
+        Key { name: "groups", meaning: "whether the results of the groups of the data are pooled" };
     /// Name of the key that makes groups share a mean and a scatter.
     pub const POOLED: &str = "pooled";
 }

@@ -114,7 +114,7 @@ pub struct JobSpecification {
     pub random: RandomQuantities,
     /// Systematic errors: quantities of the setup that are not known exactly, and wrong in all data alike.
     pub systematic: Systematic,
-    /// What is done with the groups of the data together.
+    /// Whether the results of the groups of the data are pooled.
     pub groups: GroupSettings,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,
@@ -133,7 +133,7 @@ pub struct RunSettings {
     pub random: RandomQuantities,
     /// Systematic errors: quantities of the setup that are not known exactly, and wrong in all data alike.
     pub systematic: Systematic,
-    /// What is done with the groups of the data together.
+    /// Whether the results of the groups of the data are pooled.
     pub groups: GroupSettings,
     /// Settings of the Monte Carlo loop.
     pub monte_carlo: MonteCarlo,

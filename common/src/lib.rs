@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 mod accepted;
+pub mod array_decay;
 pub mod attainable_moments;
 pub mod attenuation;
 pub mod bone;
@@ -39,6 +40,7 @@ pub mod job;
 pub mod known_quantities;
 pub mod layers;
 pub mod limits;
+pub mod line_fit;
 pub mod moments;
 mod monte_carlo;
 pub mod observables;
@@ -67,7 +69,6 @@ pub mod shift;
 pub mod signal_layout;
 mod sobol;
 pub mod special;
-pub mod spreading;
 pub mod statistics;
 pub mod systematic;
 pub mod version;

@@ -14,8 +14,8 @@
 //! The error of a group's estimate is itself an estimate, from a few velocities: `variances.rs`.
 //!
 //! What moves all estimates together (one model, one setup) is no scatter between groups, and does not become
-//! smaller with their number. It enters by what one standard deviation of each such error moves in each group:
-//! it stays in the interval of the mean and of every group, and is the same on both sides of a difference.
+//! smaller with their number. It enters by the change that one standard deviation of each such error makes in each
+//! group: it stays in the interval of the mean and of every group, and is the same on both sides of a difference.
 
 mod mixture;
 mod variances;
@@ -45,7 +45,7 @@ pub struct GroupEstimate {
     pub error: f64,
     /// Degrees of freedom behind the standard error: one less than there are independent data.
     pub freedom: u64,
-    /// What one standard deviation of each error that all groups share moves the estimate; the same errors, in
+    /// Change of the estimate by one standard deviation of each error that all groups share; the same errors, in
     /// the same order, in every group.
     pub common: Vec<f64>,
 }
@@ -74,7 +74,7 @@ struct ScatterNode {
     mean: f64,
     /// Variance of the mean without the common errors.
     variance: f64,
-    /// What the common errors move the mean.
+    /// Change of the mean by one standard deviation of each shared error.
     common: Vec<f64>,
 }
 
@@ -114,8 +114,8 @@ impl Pooling {
     /// Returns the value of group number `group`, which is in range.
     pub fn group(&self, group: usize) -> PooledNumber {
         let component = |node: &ScatterNode| {
-            let (mean, own, towards) = self.given(node, group);
-            let moved = self.moved(node, group);
+            let (mean, own, towards) = self.value_for_scatter(node, group);
+            let moved = self.changes_by_shared_errors(node, group);
             (mean, own + towards * towards * node.variance + square_sum(&moved))
         };
         self.mixture(component).summary()
@@ -124,10 +124,13 @@ impl Pooling {
     /// Returns the first group's value minus the second's; both are in range, and differ.
     pub fn difference(&self, first: usize, second: usize) -> PooledNumber {
         let component = |node: &ScatterNode| {
-            let (one, own, towards) = self.given(node, first);
-            let (other, other_own, other_towards) = self.given(node, second);
+            let (one, own, towards) = self.value_for_scatter(node, first);
+            let (other, other_own, other_towards) = self.value_for_scatter(node, second);
             let by_mean = towards - other_towards;
-            let moved = self.moved(node, first).into_iter().zip(self.moved(node, second));
+            let moved = self
+                .changes_by_shared_errors(node, first)
+                .into_iter()
+                .zip(self.changes_by_shared_errors(node, second));
             let moved: Vec<f64> = moved.map(|(one, other)| one - other).collect();
             let variance = own + other_own + by_mean * by_mean * node.variance;
             (one - other, variance + square_sum(&moved))
@@ -213,17 +216,17 @@ impl Pooling {
         own / node.scatter.mul_add(node.scatter, own)
     }
 
-    /// Returns the mean of a group's value given a scatter, its variance if the mean of all were known, and how
-    /// much that mean counts.
-    fn given(&self, node: &ScatterNode, group: usize) -> (f64, f64, f64) {
+    /// Returns the mean of a group's value for one scatter, its variance if the mean of all groups were known, and
+    /// the weight of that mean.
+    fn value_for_scatter(&self, node: &ScatterNode, group: usize) -> (f64, f64, f64) {
         let towards = self.towards_mean(node, group);
         let value = self.estimates[group].value;
         let mean = towards.mul_add(node.mean - value, value);
         (mean, self.variances[group] * (1.0 - towards), towards)
     }
 
-    /// Returns what the common errors move the value of a group, given a scatter.
-    fn moved(&self, node: &ScatterNode, group: usize) -> Vec<f64> {
+    /// Returns the change of a group's value by one standard deviation of each shared error, for one scatter.
+    fn changes_by_shared_errors(&self, node: &ScatterNode, group: usize) -> Vec<f64> {
         let towards = self.towards_mean(node, group);
         let both = self.estimates[group].common.iter().zip(&node.common);
         both.map(|(own, of_mean)| towards.mul_add(of_mean - own, *own)).collect()

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use self::noise::NoiseStream;
-use crate::source_traces::source_traces;
+use crate::source_traces::{source_traces, sources};
 
 /// Samples in a period of the centre frequency, unless the time step is given.
 const SAMPLES_OF_PERIOD: f64 = 50.0;
@@ -59,16 +59,6 @@ pub struct Recorder {
     pub further_sources: u32,
     /// Distance of these neighbours, m.
     pub source_pitch: f64,
-}
-
-impl Recorder {
-    /// Returns the sources of a probe, each with how much farther it is than the probe's own on its side, m.
-    fn sources(&self, is_bidirectional: bool) -> Vec<(Transmitter, f64)> {
-        let sides = if is_bidirectional { &Transmitter::ALL[..] } else { &[Transmitter::First] };
-        let offset = |n: u32| f64::from(n) * self.source_pitch;
-        let of_side = |&side| (0..=self.further_sources).map(move |n| (side, offset(n)));
-        sides.iter().flat_map(of_side).collect()
-    }
 }
 
 /// Signals of many bones, as whole numbers of a recorder.
@@ -244,7 +234,7 @@ impl<'a> RecordingDevice<'a> {
         });
         let packet = packets.sum::<f64>() / arrival.times.len() as f64;
         let mut largest = traces.pressures.iter().map(|trace| peak(trace)).fold(0.0, f64::max);
-        let sources = recorder.sources(setup.probe.bidirectional);
+        let sources = sources(&setup.probe, recorder.further_sources, recorder.source_pitch);
         // Waves may be larger from farther sources, where several add up.
         let case = Case { setup, bone: mean };
         for source in sources.iter().filter(|(_, offset)| *offset > 0.0) {

@@ -57,7 +57,7 @@ class Job:
             pores.
         random: scatter of quantities of the setup.
         systematic: what is the same for all data and not known exactly.
-        groups: what is done with the groups of the data together.
+        groups: whether the results of the groups of the data are pooled.
         monte_carlo: number of realizations, seed, sampling.
         objective: the function to be minimised.
         search: method and its settings.

@@ -1,10 +1,10 @@
 //! Observables besides the velocity of the first signal: its other extremum, decay and frequency, and the
 //! phase velocities of guided waves.
 
-use std::f64::consts::LN_10;
-
+use osteon_common::array_decay::decay;
 use osteon_common::bone::{BoneRef, CaseBone};
 use osteon_common::case::Setup;
+use osteon_common::line_fit::mean;
 use osteon_common::observables::{Observable, ObservableSet, ObservableValues, PerObservable};
 use osteon_common::outcome::{FailureKind, RealizationResult};
 use osteon_common::realization::{Ensemble, Realization};
@@ -13,13 +13,7 @@ use osteon_common::settings::{Extremum, Picking};
 use crate::arrival::Arrival;
 use crate::exact::guided::GuidedWave;
 use crate::failure::Failure;
-use crate::picking::{mean, slope};
 use crate::solver::{Solver, Workspace};
-
-/// Decibels per neper: 20/ln 10.
-const DECIBELS: f64 = 20.0 / LN_10;
-/// Centimetres in a metre.
-const CENTIMETRES: f64 = 100.0;
 
 /// Observables of a picked first signal.
 #[derive(Debug, Clone, PartialEq)]
@@ -170,28 +164,9 @@ impl Solver {
     }
 }
 
-/// Returns the decay, dB/cm, of amplitudes at distances (m) from the source.
-fn decay(distances: &[f64], amplitudes: &[f64]) -> f64 {
-    let levels: Vec<f64> = amplitudes.iter().map(|p| DECIBELS * libm::log(*p)).collect();
-    -slope(&levels, distances) / CENTIMETRES
-}
-
 /// Returns the frequency, Hz, whose half period is the mean time between the extrema of two arrivals;
 /// `None` if they are the same extremum.
 fn frequency(one: &Arrival, other: &Arrival) -> Option<f64> {
     let half_period = (mean(&one.times) - mean(&other.times)).abs();
     (half_period > 0.0).then(|| 0.5 / half_period)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_decay_is_the_slope_of_the_level() {
-        // 20 dB in 2 cm, and a level that lies off the line without changing its slope.
-        let distances = [0.01, 0.02, 0.03];
-        assert!((decay(&distances, &[1.0, 0.4, 0.1]) - 10.0).abs() < 1e-12);
-        assert!((decay(&distances, &[1.0, 2.0, 10.0]) + 10.0).abs() < 1e-12);
-    }
 }

@@ -4,6 +4,7 @@
 //! Which extremum that is decides [`array_rank`], for computed pressures and measured signals alike.
 
 use osteon_common::case::Setup;
+use osteon_common::line_fit::{mean, slope};
 use osteon_common::outcome::FailureKind;
 use osteon_common::settings::{self, Picking};
 
@@ -240,23 +241,6 @@ pub fn median(values: &mut [f64]) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let middle = values.len() / 2;
     if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
-}
-
-/// Returns the least-squares slope of distance (m) against time (s), m/s: the velocity of picked times.
-pub fn slope(distances: &[f64], times: &[f64]) -> f64 {
-    let (mean_distance, mean_time) = (mean(distances), mean(times));
-    let (mut cross, mut square) = (0.0, 0.0);
-    for (x, t) in distances.iter().zip(times) {
-        let dt = t - mean_time;
-        cross = dt.mul_add(x - mean_distance, cross);
-        square = dt.mul_add(dt, square);
-    }
-    cross / square
-}
-
-/// Returns the arithmetic mean.
-pub fn mean(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |sum, value| sum + value) / values.len() as f64
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use osteon_common::case::Case;
 use osteon_common::signal_layout::{SignalLayout, Transmitter};
 use osteon_files::probe_file::ProbeDescription;
 use osteon_local::modes::{BandModes, BandModesError, BoneSurroundings};
-use osteon_local::source_traces::source_traces;
+use osteon_local::source_traces::{source_traces, sources};
 use osteon_signals::{ArraySignals, DispersionImage, SignalSeries, WavePick};
 use osteon_solver::{Isa, ModesError, TraceError};
 
@@ -30,9 +30,7 @@ pub(super) fn recorded(
     isa: Isa,
 ) -> Result<(ProbeDescription, SignalSeries), CommandFailure> {
     let probe = &case.setup.probe;
-    let sides = if probe.bidirectional { &Transmitter::ALL[..] } else { &[Transmitter::First] };
-    let of_side = |&side| (0..=further).map(move |n| (side, f64::from(n) * pitch));
-    let sources: Vec<(Transmitter, f64)> = sides.iter().flat_map(of_side).collect();
+    let sources = sources(probe, further, pitch);
     let step = 1.0 / (SAMPLES_OF_PERIOD * probe.center_frequency);
     let farthest = probe.distances().fold(0.0, f64::max) + f64::from(further) * pitch;
     let duration = farthest / SLOWEST + PERIODS_AFTER / probe.center_frequency;

@@ -255,7 +255,7 @@ pub(crate) fn identify_pores(
     data: Data,
     twins: &Twins,
 ) -> Result<Option<[DerivedQuantity; 2]>, StudyError> {
-    let mut specification = specification(setup, data, REALIZATIONS, twins.seed);
+    let mut specification = specification(setup, Some(data), REALIZATIONS, twins.seed);
     let start = middle(POROSITIES);
     specification.setup.structure.porosity = Some(start);
     specification.parameters[Parameter::Porosity as usize] = free(POROSITY_BOUNDS, start);
@@ -288,7 +288,7 @@ fn posterior_of_bone(twins: &Twins, number: u64) -> Result<Option<(Point, Poster
     let model_seed = twins.seed + number;
     let mut job = specification(
         &bones.setup,
-        Data::from_velocities(velocities),
+        Some(Data::from_velocities(velocities)),
         POSTERIOR_REALIZATIONS,
         model_seed,
     );
@@ -329,7 +329,7 @@ fn holds(posterior: &Posterior, value: Quantity, level: f64, truth: f64) -> bool
 /// porosities.
 pub(crate) fn specification(
     setup: &Setup,
-    data: Data,
+    data: Option<Data>,
     realizations: u64,
     seed: u64,
 ) -> JobSpecification {
@@ -339,7 +339,7 @@ pub(crate) fn specification(
     JobSpecification {
         kind: JobKind::Identification,
         setup: setup.clone(),
-        data: Some(data),
+        data,
         parameters,
         random: RandomQuantities::default(),
         systematic: Systematic::default(),

@@ -147,7 +147,7 @@ fn picked_by_device(
     setup.probe.bidirectional = true;
     let recorder = recorder(level, 0.02);
     let seed = data_seed(twins.seed, number);
-    let mut job = porosities::specification(&setup, Data::from_velocities(Vec::new()), 1, seed);
+    let mut job = porosities::specification(&setup, None, 1, seed);
     // A uniform law reaches √3 standard deviations to either side.
     job.random.probe_tilt = Scatter {
         standard_deviation: Some(TILT.to_radians() / 3.0_f64.sqrt()),
@@ -165,8 +165,7 @@ fn identify_study(twins: &Twins, number: u64) -> Result<[Found; 2], StudyError> 
     let mut setup = Setup::default();
     setup.probe.bidirectional = true;
     let seed = data_seed(twins.seed, number);
-    let none = Data::from_velocities(Vec::new());
-    let mut bones = porosities::specification(&setup, none, 1, seed);
+    let mut bones = porosities::specification(&setup, None, 1, seed);
     bones.setup.structure.porosity = Some(truth[0]);
     let point: Point = matrix_point(truth[1]);
     let recorder = recorder(NOISE_OF_STUDY, 0.01);

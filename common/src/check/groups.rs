@@ -1,4 +1,4 @@
-//! Rules on what is done with the groups of the data together.
+//! Rules on pooling the results of groups.
 
 use crate::group_settings::GroupSettings;
 use crate::inference::PARTS_MIN;

@@ -1,10 +1,10 @@
 //! The keys of `[data]` that say how decays were measured.
 
+use osteon_common::array_decay::{ELEMENT_LENGTH, Spreading, decay_error_of_gains};
 use osteon_common::data::{Data, Measurements};
 use osteon_common::fields::Key;
 use osteon_common::observables::Observable;
 use osteon_common::probe::Probe;
-use osteon_common::spreading::{ELEMENT_LENGTH, Spreading, decay_error_of_gains};
 
 use crate::document::Value;
 use crate::reader::{Reader, Table};
@@ -21,7 +21,7 @@ const FORMS: &str = "\"line\" or \"point\" or the length of the elements across 
 pub(super) const KEYS: [Key; 2] = [
     Key {
         name: SPREADING,
-        meaning: "how the waves of measured decays spread across the array, which the model has no room for: \
+        meaning: "how the device's waves spread at right angles to the plane of the model, which has two dimensions: \
                   `\"line\"` (they do not, as in the model), `\"point\"`, or the length of the elements across the \
                   array (m, up to 0.1); required with decays, from which the part of the spreading is subtracted",
     },

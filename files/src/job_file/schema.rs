@@ -1,5 +1,6 @@
 //! The JSON Schema of job files, by which editors complete them.
 
+use osteon_common::array_decay::ELEMENT_LENGTH;
 use osteon_common::bone::Sublayers;
 use osteon_common::bone_structure::{BoneStructure, PorosityProfile};
 use osteon_common::case::Setup;
@@ -12,7 +13,6 @@ use osteon_common::parameters::Parameter;
 use osteon_common::porosity::{self, POROSITY, PorosityModel};
 use osteon_common::pulse::{PulseForm, TONE_CYCLES};
 use osteon_common::pulse_samples::{SAMPLES, STEP};
-use osteon_common::spreading::ELEMENT_LENGTH;
 use osteon_common::version::VERSION;
 use serde_json::{Map, Value as Json, json};
 

@@ -101,9 +101,11 @@ pub struct ScaledErrors {
     pub data: f64,
     /// Degrees of freedom behind it: one less than there are independent velocities, or subjects.
     pub freedom: u64,
-    /// What one standard error by sampling of each compared moment of the model moves it, in all groups together.
+    /// Change of the estimate by one standard error of each compared moment of the model, which sampling makes; the
+    /// same errors in all groups.
     pub sampling: Vec<f64>,
-    /// What one standard deviation of each key of the job's `systematic` moves it, in all groups together.
+    /// Change of the estimate by one standard deviation of each key of the job's `systematic`; the same errors in all
+    /// groups.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub systematic: BTreeMap<String, f64>,
 }

@@ -210,38 +210,40 @@ impl PosteriorSearch {
         if passed || left == 0 {
             return;
         }
-        let population = self.population(number);
+        let (population, scouts) = self.population(number);
         self.nothing_matches = population.members.is_empty();
         let pending = match population.members.len() < MEMBERS_MIN && self.goes_on_exploring() {
-            true => self.batch_to_explore(left),
+            true => self.batch_to_explore(scouts, left),
             false if self.nothing_matches => Vec::new(),
             false => self.batch_to_check(population, left),
         };
         self.pending = pending.into_iter().rev().collect();
     }
 
-    /// Draws population number `number`: about the scouts that are nearest to the data if points of the prior do not
-    /// match these.
-    fn population(&mut self, number: u64) -> Population {
-        let Some(problem) = &self.problem else { return Population::default() };
+    /// Draws population number `number`. If points of the prior do not match the data, it is drawn about the scouts
+    /// that are nearest to these, and the scouts are returned, too.
+    fn population(&mut self, number: u64) -> (Population, Vec<Point>) {
+        let Some(problem) = &self.problem else { return Default::default() };
         let population = problem.population(&self.surrogate, SCOUTS, number);
-        if population.members.len() >= MEMBERS_MIN || self.surrogate.len() == 0 {
-            return population;
+        if population.members.len() >= MEMBERS_MIN {
+            return (population, Vec::new());
         }
         let scouts = self.scouts(problem);
+        if self.surrogate.len() == 0 {
+            return (population, scouts);
+        }
         let near: Vec<&Point> = scouts.iter().take(NEAR).collect();
         let problem = problem.clone().drawn_near(&near);
         let population = problem.population(&self.surrogate, SCOUTS, number);
         self.problem = Some(problem);
-        population
+        (population, scouts)
     }
 
-    /// Returns at most `most` points to look for the data.
-    fn batch_to_explore(&mut self, most: usize) -> Vec<Pending> {
-        let Some(problem) = &self.problem else { return Vec::new() };
-        let scouts = self.scouts(problem).into_iter().take(BATCH.min(most));
+    /// Returns the first of these points, at most `most`, to be evaluated.
+    fn batch_to_explore(&mut self, scouts: Vec<Point>, most: usize) -> Vec<Pending> {
         self.explored += 1;
         self.in_vain += 1;
+        let scouts = scouts.into_iter().take(BATCH.min(most));
         scouts.map(|point| Pending { point, used_for: PointUse::Explore }).collect()
     }
 

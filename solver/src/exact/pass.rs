@@ -1,6 +1,7 @@
 //! One pass in one band: the extrema of the signals, the pick among them, and the estimate of its error.
 
 use osteon_common::case::Setup;
+use osteon_common::line_fit::{mean, slope};
 use osteon_common::probe::Place;
 use osteon_common::sampling;
 
@@ -14,7 +15,7 @@ use crate::exact::tables::Tables;
 use crate::failure::{Failure, pressure_not_finite};
 use crate::isa::Kernel;
 use crate::lanes::{ComplexLanes, LANES, Lanes};
-use crate::picking::{self, Pick, Window, pick};
+use crate::picking::{Pick, Window, pick};
 use crate::vector::Vector;
 
 /// Ratio of the stated error of a band to the root mean square change of the velocity when the band is
@@ -83,7 +84,7 @@ pub(super) fn pick_with_error(
     let moved = prepared.isa.run(Repick { bin, band, times: &pick.times, workspace });
     let changes: [f64; LANES] = std::array::from_fn(|taper| {
         let times: Vec<f64> = moved.iter().map(|times| times.0[taper]).collect();
-        picking::slope(&prepared.distances, &times) / pick.velocity - 1.0
+        slope(&prepared.distances, &times) / pick.velocity - 1.0
     });
     let band_error = BAND_FACTOR * slow_decay_factor(&prepared.setup) * root_mean_square(&changes);
     let sampling_error = sampling_error(prepared, bin, band, &pick, workspace);
@@ -109,7 +110,7 @@ fn sampling_error(
 ) -> f64 {
     let PreparedSetup { setup, places, isa, .. } = prepared;
     let delays = isa.run(ReadNoise { setup, places, bin, band, times: &pick.times, workspace });
-    let mean = picking::mean(&pick.times);
+    let mean = mean(&pick.times);
     let spread = pick.times.iter().fold(0.0, |sum, t| (t - mean).mul_add(t - mean, sum));
     let (mut changes, mut worst) = ([0.0; NOISE_TIMES], 0.0);
     for (t, delays) in pick.times.iter().zip(&delays) {

@@ -1,8 +1,8 @@
-//! Spreading of waves across the plane of the model, which has none.
+//! The decay of waves along an array: of amplitudes, and what a device's elements and receivers add to it.
 //!
-//! The model's source and receivers are lines across its plane: what they record decays along the array without the
-//! spreading of a device's waves, whose elements are finite. With elements of length l, and waves of the number
-//! k = 2 π f/v that run along the bone, the level falls with the distance r as that of
+//! The model has two dimensions: its waves do not spread at right angles to its plane, and those of a device, whose
+//! elements are finite, do. With elements of length l, and waves of the wavenumber k = 2 π f/v that run along the
+//! bone, the amplitude falls for that reason with the distance r as
 //!
 //! ```text
 //! |∫₀ˡ (l - s) exp(i k s²/(2 r)) ds| / √r
@@ -13,6 +13,7 @@
 use std::f64::consts::{LN_10, TAU};
 
 use crate::accepted::Interval;
+use crate::line_fit::{mean, slope};
 use crate::probe::Probe;
 
 /// Decibels per neper: 20/ln 10.
@@ -25,7 +26,7 @@ pub const ELEMENT_LENGTH: Interval = Interval::above_to(0.0, 0.1, "m");
 const PAIRS: f64 = 32.0;
 const PAIRS_OF_RADIAN: f64 = 4.0;
 
-/// How waves spread across the plane of the model.
+/// How waves spread at right angles to the plane of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Spreading {
     /// Not at all, as in the model.
@@ -36,62 +37,56 @@ pub enum Spreading {
     Elements(f64),
 }
 
+/// Returns the decay, dB/cm, of amplitudes at distances (m) from the source: minus the least-squares slope of
+/// 20 log10 of the amplitude.
+pub fn decay(distances: &[f64], amplitudes: &[f64]) -> f64 {
+    let levels: Vec<f64> = amplitudes.iter().map(|p| DECIBELS * libm::log(*p)).collect();
+    -slope(&levels, distances) / CENTIMETRES
+}
+
 impl Spreading {
-    /// Returns by how much more, dB/cm, the level of waves decays along a probe than in the model: minus the
-    /// least-squares slope over the receivers. `velocity` is that of the waves, m/s.
+    /// Returns by how much more, dB/cm, waves decay along a probe than in the model. `velocity` is that of the
+    /// waves, m/s.
     pub fn decay(self, probe: &Probe, velocity: f64) -> f64 {
-        let wave_number = TAU * probe.center_frequency / velocity;
-        let level = |distance: f64| match self {
-            Self::Line => 0.0,
-            Self::Point => -0.5 * libm::log(distance),
-            Self::Elements(length) => level_of_elements(length, wave_number, distance),
+        let wavenumber = TAU * probe.center_frequency / velocity;
+        let amplitude = |distance: f64| match self {
+            Self::Line => 1.0,
+            Self::Point => 1.0 / distance.sqrt(),
+            Self::Elements(length) => amplitude_of_elements(length, wavenumber, distance),
         };
         let distances: Vec<f64> = probe.distances().collect();
-        let levels: Vec<f64> = distances.iter().copied().map(level).collect();
-        -slope(&distances, &levels) * DECIBELS / CENTIMETRES
+        let amplitudes: Vec<f64> = distances.iter().copied().map(amplitude).collect();
+        decay(&distances, &amplitudes)
     }
 }
 
 /// Returns the standard deviation of a decay, dB/cm, if the gains of the receivers differ by this one, dB.
 pub fn decay_error_of_gains(probe: &Probe, gains: f64) -> f64 {
     let distances: Vec<f64> = probe.distances().collect();
-    gains / sum_of_squares(&distances).sqrt() / CENTIMETRES
+    let centre = mean(&distances);
+    let squares: f64 = distances.iter().map(|x| (x - centre) * (x - centre)).sum();
+    gains / squares.sqrt() / CENTIMETRES
 }
 
-/// Returns the logarithm of the level, up to a constant.
-fn level_of_elements(length: f64, wave_number: f64, distance: f64) -> f64 {
-    let curvature = 0.5 * wave_number / distance;
+/// Returns the amplitude at a distance (m), up to a constant, by Simpson's rule.
+fn amplitude_of_elements(length: f64, wavenumber: f64, distance: f64) -> f64 {
+    let curvature = 0.5 * wavenumber / distance;
     let pairs = (PAIRS + PAIRS_OF_RADIAN * curvature * length * length).ceil();
     let step = 0.5 * length / pairs;
     let (mut real, mut imaginary) = (0.0, 0.0);
     for k in 0..=2 * pairs as u64 {
         let s = k as f64 * step;
-        let weight = if k.is_multiple_of(2) { 2.0 } else { 4.0 };
-        let weight = if k == 0 { 1.0 } else { weight };
-        // The last term is 0.
+        // The last term is 0, so that its weight does not matter.
+        let weight = match k {
+            0 => 1.0,
+            _ if k.is_multiple_of(2) => 2.0,
+            _ => 4.0,
+        };
         let (sin, cos) = libm::sincos(curvature * s * s);
         real += weight * (length - s) * cos;
         imaginary += weight * (length - s) * sin;
     }
-    let square = step * step * (real * real + imaginary * imaginary);
-    0.5 * libm::log(square / distance)
-}
-
-/// Returns the least-squares slope of values at these places.
-fn slope(places: &[f64], values: &[f64]) -> f64 {
-    let centre = mean(places);
-    let cross = places.iter().zip(values).map(|(x, value)| (x - centre) * value);
-    cross.sum::<f64>() / sum_of_squares(places)
-}
-
-/// Returns the sum of squares about the mean.
-fn sum_of_squares(places: &[f64]) -> f64 {
-    let centre = mean(places);
-    places.iter().map(|x| (x - centre) * (x - centre)).sum()
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
+    step * libm::hypot(real, imaginary) / distance.sqrt()
 }
 
 #[cfg(test)]
@@ -101,6 +96,14 @@ mod tests {
     fn check(spreading: Spreading, expected: f64, tolerance: f64) {
         let found = spreading.decay(&Probe::default(), 3900.0);
         assert!((found - expected).abs() <= tolerance, "{spreading:?}: {found}, {expected}");
+    }
+
+    #[test]
+    fn the_decay_is_the_slope_of_the_level() {
+        // 20 dB in 2 cm, and a level that lies off the line without changing its slope.
+        let distances = [0.01, 0.02, 0.03];
+        assert!((decay(&distances, &[1.0, 0.4, 0.1]) - 10.0).abs() < 1e-12);
+        assert!((decay(&distances, &[1.0, 2.0, 10.0]) + 10.0).abs() < 1e-12);
     }
 
     #[test]
