@@ -50,7 +50,7 @@ class Package(unittest.TestCase):
         for path in [*(ROOT / "docs").iterdir(), ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "LICENSE-APACHE"]:
             self.assertEqual((document / path.name).read_bytes(), path.read_bytes())
         for path in (ROOT / "examples").rglob("*"):
-            if path.suffix in (".toml", ".csv"):
+            if path.suffix in (".toml", ".csv", ".npy"):
                 inside = document / "examples" / path.relative_to(ROOT / "examples")
                 self.assertEqual(inside.read_bytes(), path.read_bytes())
         self.assertIn("MIT", (document / "copyright").read_text())

@@ -202,7 +202,7 @@ impl SampleSlopes {
     /// Computes the weights.
     pub(crate) fn new() -> Self {
         let weight = |k: usize| {
-            let sign = if k % 2 == 0 { -1.0 } else { 1.0 };
+            let sign = if k.is_multiple_of(2) { -1.0 } else { 1.0 };
             sign / k as f64 * WINDOW[HALF_WIDTH + k - 1]
         };
         let weights = std::array::from_fn(|place| match place.cmp(&HALF_WIDTH) {
