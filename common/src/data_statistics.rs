@@ -2,9 +2,11 @@
 //! can come from the model's law.
 
 mod few;
+mod form;
 mod intervals;
 mod kolmogorov;
 mod lattice;
+mod order;
 
 use crate::job::Data;
 use crate::limits;
@@ -13,9 +15,11 @@ use crate::robust::outliers;
 use crate::statistics::measured_observables;
 
 pub use self::few::{FewIntervals, intervals_of_data};
+pub use self::form::form_tests;
 pub use self::intervals::{intervals_of_moments, moment_intervals};
 pub use self::kolmogorov::{FittedMoments, kolmogorov_test, predictive_test};
 pub use self::lattice::rounding;
+pub use self::order::order_test;
 
 /// Probability with which an interval contains the moment of the law.
 pub const CONFIDENCE: f64 = 0.95;
@@ -35,6 +39,9 @@ impl DataSummary {
                 None => intervals_of_moments(data),
             },
             rounding: given.and_then(|given| rounding(given.velocities)),
+            order: given
+                .filter(|given| given.subjects.is_none())
+                .and_then(|given| order_test(given.velocities)),
             outlier_count: outliers.len() as u64,
             outliers: outliers.into_iter().take(limits::OUTLIERS_LISTED_MAX).collect(),
         }

@@ -173,6 +173,36 @@ pub struct Outlier {
     pub deviations: f64,
 }
 
+/// Tests of the form of the distribution of velocities against the model's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FormTests {
+    /// L-skewness, -1 to 1: above 0 where high velocities are farther off than low ones.
+    pub skewness: FormTest,
+    /// L-kurtosis, -0.25 to 1: 0.12 of a normal distribution, more with heavier tails.
+    pub kurtosis: FormTest,
+}
+
+/// A number that describes the form of a distribution, of the data and of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FormTest {
+    /// That of the data.
+    pub data: f64,
+    /// That of the model's velocities.
+    pub model: f64,
+    /// Probability of at least this difference, to either side, if the data come from the model's law; at least
+    /// 0.002.
+    pub p_value: f64,
+}
+
+/// Test of whether neighbouring velocities are more alike than in a random order.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OrderTest {
+    /// Von Neumann's ratio of their ranks: about 2 in a random order, less where neighbours are alike.
+    pub ratio: f64,
+    /// Probability of at most this ratio in a random order.
+    pub p_value: f64,
+}
+
 /// Result of the two-sample Kolmogorov-Smirnov test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KolmogorovTest {

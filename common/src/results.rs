@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::conclusions::Conclusions;
 use crate::job::{Objective, Sampling, Search};
-use crate::moments::{KolmogorovTest, MomentIntervals, Outlier};
+use crate::moments::{FormTests, KolmogorovTest, MomentIntervals, OrderTest, Outlier};
 use crate::observables::ObservableValues;
 use crate::outcome::{FailureCounts, Outcome};
 use crate::parameters::{Parameter, Point};
@@ -194,6 +194,9 @@ pub struct DataSummary {
     pub outliers: Vec<Outlier>,
     /// Step to which the velocities are rounded, m/s; `None` if none is seen.
     pub rounding: Option<f64>,
+    /// Test of whether the velocities are independent of their order; `None` if only the moments are known, and
+    /// for few or sorted ones and those of named subjects.
+    pub order: Option<OrderTest>,
     /// Number of all velocities far from the others.
     pub outlier_count: u64,
 }
@@ -348,6 +351,8 @@ pub struct BestPoint {
     /// Test of whether the measured velocities can come from the model's law; `None` if only
     /// moments were measured, and for a propagation.
     pub kolmogorov: Option<KolmogorovTest>,
+    /// Tests of their form; `None` where `kolmogorov` is, and for few velocities.
+    pub form: Option<FormTests>,
     /// Failed realizations by kind.
     pub failures: FailureCounts,
     /// Estimated errors of the successes, unless there are none, or the errors are unknown.

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use osteon_common::data_statistics::{FittedMoments, kolmogorov_test};
+use osteon_common::data_statistics::{FittedMoments, form_tests, kolmogorov_test};
 use osteon_common::digest::PathDigest;
 use osteon_common::inference::{
     Agreement, Conclusions, ModelAtPoint, agreement, below_noise_from, meaning,
@@ -406,6 +406,7 @@ impl Summary {
             kolmogorov: tested.and_then(|set| {
                 kolmogorov_test(set.velocities, outcomes, monte_carlo.sampling, fitted)
             }),
+            form: tested.and_then(|set| form_tests(set.velocities, outcomes, monte_carlo.sampling)),
             failures: row.failures,
             estimated_error: row.estimated_error,
             outcomes: outcomes.to_vec(),

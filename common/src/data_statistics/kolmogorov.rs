@@ -21,10 +21,10 @@ use crate::quantile::quantile;
 /// to 16 at 0.3 for 64 points, 33 to 78 and 14 to 22 for 256, 39 to 98 and 19 to 44 for 1024.
 const SOBOL_WORTH: f64 = 10.0;
 /// Number of samples of the model's law that the data are compared with.
-const SAMPLES: usize = 999;
+pub(super) const SAMPLES: usize = 999;
 /// Largest size of these samples. With the correction for the size the law of the distance of
 /// larger ones is the same.
-const SAMPLE_MAX: usize = 400;
+pub(super) const SAMPLE_MAX: usize = 400;
 
 /// Which moments of the model's law were fitted to the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,16 +109,23 @@ fn test(
             distance_at_limits(&ascending, Some(step), below)
         }
     };
+    let size = data.len().min(SAMPLE_MAX);
+    let equivalent = equivalent_size(data.len(), model.len(), sampling);
+    let expected = distance * corrected_root(equivalent) / corrected_root(size as f64);
+    let law = ModelLaw { model, fitted, step };
+    let p_value = law.exceedance(expected, size);
+    Some(KolmogorovTest { distance, p_value })
+}
+
+/// Returns the number of data that would be as far from an exactly known law as `data` are from `model`
+/// realizations of it.
+pub(super) fn equivalent_size(data: usize, model: usize, sampling: Sampling) -> f64 {
     let worth = match sampling {
         Sampling::MonteCarlo => 1.0,
         Sampling::Sobol => SOBOL_WORTH,
     };
-    let (n, m) = (data.len() as f64, worth * model.len() as f64);
-    let size = data.len().min(SAMPLE_MAX);
-    let expected = distance * corrected_root(n * m / (n + m)) / corrected_root(size as f64);
-    let law = ModelLaw { model, fitted, step };
-    let p_value = law.exceedance(expected, size);
-    Some(KolmogorovTest { distance, p_value })
+    let (n, m) = (data as f64, worth * model as f64);
+    n * m / (n + m)
 }
 
 /// Returns the factor that makes distances of samples of different sizes comparable (M. A. Stephens,
@@ -143,28 +150,13 @@ impl ModelLaw<'_> {
         let mut rng = ChaCha20Rng::from_seed([0; 32]);
         let of_model = mean_and_deviation(self.model);
         let exceeding = (0..SAMPLES).filter(|_| {
-            let sample = self.sample(&mut rng, size);
+            let sample = sample_of(self.model, &mut rng, size);
             let (shift, scale) = self.fit(&sample, of_model);
             let mut below = self.distribution();
             let found = distance_at_limits(&sample, self.step, |t| below((t - shift) / scale));
             found >= distance
         });
         (1 + exceeding.count()) as f64 / (SAMPLES + 1) as f64
-    }
-
-    /// Draws a sample in ascending order. Sums of exponential numbers, divided by the last one, are
-    /// uniform numbers in ascending order.
-    fn sample(&self, rng: &mut ChaCha20Rng, size: usize) -> Vec<f64> {
-        let mut sum = 0.0;
-        let mut sums: Vec<f64> = (0..=size)
-            .map(|_| {
-                let uniform = ((rng.next_u64() >> 11) as f64 + 0.5) / (1_u64 << 53) as f64;
-                sum -= libm::log(uniform);
-                sum
-            })
-            .collect();
-        sums.pop();
-        sums.iter().map(|part| quantile(self.model, part / sum).unwrap_or(f64::NAN)).collect()
     }
 
     /// Returns the shift and the scale that give the model's law the fitted moments of a sample.
@@ -206,14 +198,29 @@ impl ModelLaw<'_> {
     }
 }
 
-fn sorted(sample: impl Iterator<Item = f64>) -> Vec<f64> {
+/// Draws a sample, in ascending order, of the law of velocities in ascending order. Sums of exponential numbers,
+/// divided by the last one, are uniform numbers in ascending order.
+pub(super) fn sample_of(model: &[f64], rng: &mut ChaCha20Rng, size: usize) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut sums: Vec<f64> = (0..=size)
+        .map(|_| {
+            let uniform = ((rng.next_u64() >> 11) as f64 + 0.5) / (1_u64 << 53) as f64;
+            sum -= libm::log(uniform);
+            sum
+        })
+        .collect();
+    sums.pop();
+    sums.iter().map(|part| quantile(model, part / sum).unwrap_or(f64::NAN)).collect()
+}
+
+pub(super) fn sorted(sample: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut sample: Vec<f64> = sample.collect();
     sample.sort_unstable_by(f64::total_cmp);
     sample
 }
 
 /// Returns mean and standard deviation; NaN for no values.
-fn mean_and_deviation(values: &[f64]) -> [f64; 2] {
+pub(super) fn mean_and_deviation(values: &[f64]) -> [f64; 2] {
     let count = values.len() as f64;
     let first = values.first().copied().unwrap_or(f64::NAN);
     let mean = first + values.iter().map(|value| value - first).sum::<f64>() / count;

@@ -86,6 +86,7 @@ fn best(cost: f64, standard_error: Moments) -> BestPoint {
         cost_error: None,
         failure_bias: None,
         kolmogorov: None,
+        form: None,
         failures: FailureCounts::default(),
         estimated_error: None,
         outcomes: Vec::new(),

@@ -1,6 +1,8 @@
 //! The objects `velocity` and `data`: moments of the model and of the data, and what is known of them.
 
-use osteon_common::moments::{ConfidenceInterval, KolmogorovTest, ObservableEstimates, Outlier};
+use osteon_common::moments::{
+    ConfidenceInterval, FormTests, KolmogorovTest, ObservableEstimates, OrderTest, Outlier,
+};
 use osteon_common::observables::ObservableValues;
 use osteon_common::results::{self, BestPoint, DataSummary, Estimate};
 use schemars::JsonSchema;
@@ -138,6 +140,14 @@ pub struct Data {
         deserialize_with = "absent_or_nullable"
     )]
     pub kolmogorov: Option<Option<KolmogorovTest>>,
+    /// Tests of skewness and kurtosis against the model's; not there where `kolmogorov` is null, and for less than
+    /// eight velocities.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub form: Option<FormTests>,
+    /// Test of whether neighbouring velocities are more alike than in a random order (Bartels' rank test); not
+    /// there where only moments are known, for less than ten velocities, for sorted ones, and with subjects.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<OrderTest>,
     /// The velocities farther from the median than 6 robust standard deviations (and than 6 + 300/n²
     /// for n of them), in their order, at most the first 100; not there where there is none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -167,6 +177,8 @@ impl Data {
             observables: data.observables,
             interval: (measured || intervals.is_some()).then_some(intervals),
             kolmogorov: measured.then(|| best.and_then(|best| best.kolmogorov)),
+            form: best.and_then(|best| best.form),
+            order: data.order,
             outliers: data.outliers.clone(),
             rounding: data.rounding,
             outlier_count: Some(data.outlier_count).filter(|count| *count > 0),

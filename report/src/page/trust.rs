@@ -13,6 +13,8 @@ use crate::text::escape;
 const FAILED_MAX: f64 = 0.001;
 /// Largest estimated relative error of a velocity that is no reason for doubt.
 const SOLVER_ERROR_MAX: f64 = 1e-3;
+/// Probability of a test of the data's form or order below which it is a reason for doubt.
+const STRIKING: f64 = 0.01;
 
 /// How a finding bears on the result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -129,6 +131,8 @@ fn finding_verdicts(finding: &Finding<'_>) -> Vec<Verdict> {
     found.extend(parameters_verdict(finding));
     found.extend(posterior_verdict(finding));
     found.extend(distribution_verdict(finding));
+    found.extend(form_verdict(finding));
+    found.extend(order_verdict(finding));
     found.extend(starts_verdict(finding));
     found.push(failures_verdict(finding));
     found.extend(outliers_verdict(finding));
@@ -241,6 +245,30 @@ fn distribution_verdict(finding: &Finding<'_>) -> Option<Verdict> {
         );
         verdict(Bearing::Good, "Distribution", words)
     })
+}
+
+fn form_verdict(finding: &Finding<'_>) -> Option<Verdict> {
+    let tests = finding.data?.form?;
+    let named = [("L-skewness", tests.skewness), ("L-kurtosis", tests.kurtosis)];
+    let striking = named.into_iter().filter(|(_, test)| test.p_value < STRIKING);
+    let parts: Vec<String> = striking
+        .map(|(name, test)| {
+            let [data, model, p] = [test.data, test.model, test.p_value].map(|x| digits(x, 2));
+            format!("{name} {data}, of the model {model}, p = {p}")
+        })
+        .collect();
+    let words = format!("Skewness or tails are not the model's ({}).", parts.join("; "));
+    (!parts.is_empty()).then(|| verdict(Bearing::Caution, "Form", words))
+}
+
+fn order_verdict(finding: &Finding<'_>) -> Option<Verdict> {
+    let test = finding.data?.order.filter(|test| test.p_value < STRIKING)?;
+    let words = format!(
+        "Velocities that follow each other in the file are alike (Bartels' rank test, p = {}), and the \
+         intervals take them for independent. Several may be of one bone, or the device may drift.",
+        digits(test.p_value, 2)
+    );
+    Some(verdict(Bearing::Caution, "Independence", words))
 }
 
 fn starts_verdict(finding: &Finding<'_>) -> Option<Verdict> {

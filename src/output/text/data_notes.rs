@@ -1,5 +1,6 @@
 //! Remarks on measured data as text.
 
+use osteon_common::moments::FormTest;
 use osteon_files::report::Data;
 
 use super::layout::{glued, wrapped};
@@ -11,6 +12,8 @@ const LISTED_MAX: usize = 5;
 const COARSE: f64 = 0.1;
 /// Probability of a test below which its assumption is said to be wrong.
 const SIGNIFICANT: f64 = 0.05;
+/// The same of tests that are not shown otherwise.
+const STRIKING: f64 = 0.01;
 
 /// Why few velocities have no intervals.
 pub(super) const TOO_FEW: &str =
@@ -18,7 +21,7 @@ pub(super) const TOO_FEW: &str =
 
 /// Returns all remarks, each on lines of its own.
 pub(super) fn text(data: &Data) -> String {
-    let remarks = [outliers(data), rounding(data), kolmogorov(data)];
+    let remarks = [outliers(data), rounding(data), order(data), kolmogorov(data), form(data)];
     remarks.into_iter().flatten().map(|remark| wrapped(&remark)).collect()
 }
 
@@ -69,6 +72,35 @@ fn kolmogorov(data: &Data) -> Option<String> {
     ))
 }
 
+/// Returns that skewness or tails are not the model's, if a test says so.
+fn form(data: &Data) -> Option<String> {
+    let tests = data.form?;
+    let part = |name: &str, test: FormTest, [less, more]: [&str; 2]| {
+        let (data, model) = (digits(test.data, 2), digits(test.model, 2));
+        let numbers =
+            glued(&format!("{data}, of the model {model}, p = {}", digits(test.p_value, 2)));
+        let which = if test.data < test.model { less } else { more };
+        (test.p_value < STRIKING).then(|| format!("{which} ({name} {numbers})"))
+    };
+    let skewness = part("L-skewness", tests.skewness, ["reach farther down", "reach farther up"]);
+    let kurtosis = part("L-kurtosis", tests.kurtosis, ["have lighter tails", "have heavier tails"]);
+    let parts: Vec<String> = [skewness, kurtosis].into_iter().flatten().collect();
+    (!parts.is_empty())
+        .then(|| format!("The velocities {} than the model's velocities do.", parts.join(" and ")))
+}
+
+/// Returns that neighbours in the file are alike, if they are.
+pub(super) fn order(data: &Data) -> Option<String> {
+    let test = data.order.filter(|test| test.p_value < STRIKING)?;
+    let numbers = format!("ratio {}, p = {}", digits(test.ratio, 2), digits(test.p_value, 2));
+    Some(format!(
+        "Velocities that follow each other are alike (Bartels' rank test: {}), and the intervals take them for \
+         independent. If several are of one bone, name the column of bones (`subject` of [data]). A device that \
+         drifts looks the same.",
+        glued(&numbers)
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -106,6 +138,36 @@ mod tests {
         };
         assert!(of(0.06).ends_with("fitted to these data)"), "{}", of(0.06));
         assert!(of(0.003).contains("do not have the model's distribution"), "{}", of(0.003));
+    }
+
+    fn with(more: &str) -> Data {
+        let data = format!(r#"{{"mean": 3900.0, "coefficient_of_variation": 0.03, {more}}}"#);
+        serde_json::from_str(&data).unwrap()
+    }
+
+    #[test]
+    fn another_form_than_the_models_is_told() {
+        let of = |skewed: f64, heavy: f64| {
+            form(&with(&format!(
+                r#""form": {{"skewness": {{"data": -0.2, "model": 0.01, "p_value": {skewed:?}}},
+                    "kurtosis": {{"data": 0.25, "model": 0.12, "p_value": {heavy:?}}}}}"#
+            )))
+        };
+        assert_eq!(of(0.02, 0.5), None);
+        let one = of(0.004, 0.5).unwrap();
+        assert!(
+            one.starts_with("The velocities reach farther down (L-skewness -0.20, of"),
+            "{one}"
+        );
+        let both = of(0.004, 0.002).unwrap();
+        assert!(both.contains("and have heavier tails (L-kurtosis 0.25, of"), "{both}");
+    }
+
+    #[test]
+    fn neighbours_that_are_alike_are_told() {
+        let of = |p: f64| order(&with(&format!(r#""order": {{"ratio": 1.24, "p_value": {p:?}}}"#)));
+        assert_eq!(of(0.02), None);
+        assert!(of(0.002).unwrap().contains("name the column of bones"), "{:?}", of(0.002));
     }
 
     #[test]

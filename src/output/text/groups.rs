@@ -285,7 +285,8 @@ fn remarks(group: &Group, control_variate: bool) -> impl Iterator<Item = String>
         Status::Failed => None,
         _ => uncontrolled(control_variate, &group.velocity, &group.failures),
     };
-    let of_data = [data_notes::outliers(&group.data), data_notes::rounding(&group.data)];
+    let data = &group.data;
+    let of_data = [data_notes::outliers(data), data_notes::rounding(data), data_notes::order(data)];
     let of_posterior = group.posterior.as_ref().and_then(posterior::outliers);
     of_data.into_iter().chain([of_posterior, uncontrolled]).flatten()
 }
