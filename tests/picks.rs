@@ -70,7 +70,11 @@ fn a_template_describes_its_file_and_nothing_is_overwritten() {
     let (comments, lines): (Vec<&str>, Vec<&str>) =
         table.lines().partition(|line| line.starts_with('#'));
     assert_eq!(comments, ["# picking.extremum = \"first\"", "# picking.threshold = 0.05"]);
-    assert_eq!(lines[0], "velocity,standard_error,quality,failure");
+    assert_eq!(
+        lines[0],
+        "velocity,standard_error,quality,failure,other_velocity,other_standard_error,decay,\
+         decay_standard_error,center_frequency,center_frequency_standard_error"
+    );
     assert!(lines.len() == 3 && lines[1] == lines[2] && lines[1].starts_with("3908.7"), "{table}");
 }
 

@@ -53,14 +53,15 @@ fn a0_of_a_twin_is_that_of_the_model() {
     let mut lines = table.lines().filter(|line| !line.starts_with('#'));
     assert_eq!(
         lines.next().unwrap(),
-        "velocity,standard_error,quality,failure,a0_velocity,a0_standard_error,a0_failure,\
-         a0_velocity_400kHz,a0_standard_error_400kHz,a0_failure_400kHz"
+        "velocity,standard_error,quality,failure,other_velocity,other_standard_error,decay,\
+         decay_standard_error,center_frequency,center_frequency_standard_error,a0_velocity,\
+         a0_standard_error,a0_failure,a0_velocity_400kHz,a0_standard_error_400kHz,a0_failure_400kHz"
     );
     let expected = model(&scratch, "0.2e6:0.4e6:2");
     let mut count = 0;
     for line in lines {
         let fields: Vec<&str> = line.split(',').collect();
-        for (place, expected) in [4, 7].into_iter().zip(&expected) {
+        for (place, expected) in [10, 13].into_iter().zip(&expected) {
             let found: f64 = fields[place].parse().unwrap();
             assert!((found / expected - 1.0).abs() < 0.01, "{found}, {expected}: {table}");
             assert_eq!(fields[place + 2], "");

@@ -63,9 +63,16 @@ impl Spreading {
 /// Returns the standard deviation of a decay, dB/cm, if the gains of the receivers differ by this one, dB.
 pub fn decay_error_of_gains(probe: &Probe, gains: f64) -> f64 {
     let distances: Vec<f64> = probe.distances().collect();
-    let centre = mean(&distances);
+    decay_error(&distances, &vec![gains / DECIBELS; distances.len()])
+}
+
+/// Returns the standard deviation of a decay, dB/cm, given those of the amplitudes relative to these.
+pub fn decay_error(distances: &[f64], relative_errors: &[f64]) -> f64 {
+    let centre = mean(distances);
     let squares: f64 = distances.iter().map(|x| (x - centre) * (x - centre)).sum();
-    gains / squares.sqrt() / CENTIMETRES
+    let parts = distances.iter().zip(relative_errors).map(|(x, error)| (x - centre) * error);
+    let variance: f64 = parts.map(|part| part * part).sum();
+    DECIBELS * variance.sqrt() / squares / CENTIMETRES
 }
 
 /// Returns the amplitude at a distance (m), up to a constant, by Simpson's rule.

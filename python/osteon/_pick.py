@@ -58,6 +58,21 @@ class Picks:
         return np.array([one["failure"] or "" for one in self._series], dtype=np.str_)
 
     @property
+    def other_velocities(self) -> Floats:
+        """Velocity of the extremum that is not picked, m/s; NaN where there is none."""
+        return self._measured("other_velocity", "value")
+
+    @property
+    def decays(self) -> Floats:
+        """Decay of the picked extremum along the array, dB/cm; NaN where there is none."""
+        return self._measured("decay", "value")
+
+    @property
+    def center_frequencies(self) -> Floats:
+        """Frequency of the first signal, Hz; NaN where there is none."""
+        return self._measured("center_frequency", "value")
+
+    @property
     def times(self) -> Floats:
         """Times of the picked extremum, s, as an array (series, receiver), from the first source; NaN where a
         receiver has none, and beyond the receivers of a series that has fewer than others."""
@@ -79,7 +94,8 @@ class Picks:
             file.write(self._table)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row for each series: velocity and standard error (m/s), quality, failure."""
+        """A row for each series: velocity and standard error (m/s), quality, failure, and other velocity (m/s),
+        decay (dB/cm) and centre frequency (Hz) with their standard errors."""
         import pandas
 
         columns = {
@@ -87,11 +103,21 @@ class Picks:
             "standard_error": self.standard_errors,
             "quality": self.qualities,
             "failure": self.failures,
+            "other_velocity": self.other_velocities,
+            "other_standard_error": self._measured("other_velocity", "standard_error"),
+            "decay": self.decays,
+            "decay_standard_error": self._measured("decay", "standard_error"),
+            "center_frequency": self.center_frequencies,
+            "center_frequency_standard_error": self._measured("center_frequency", "standard_error"),
         }
         return pandas.DataFrame(columns)
 
     def _numbers(self, key: str) -> Floats:
         return np.array([one[key] for one in self._series], dtype=np.float64)
+
+    def _measured(self, key: str, part: str) -> Floats:
+        found = [None if one[key] is None else one[key][part] for one in self._series]
+        return np.array(found, dtype=np.float64)
 
     def __repr__(self) -> str:
         found = int(np.isfinite(self.velocities).sum())

@@ -1,5 +1,6 @@
 //! Which extremum the array picks, by the model's own rule.
 
+use osteon_common::settings::Picking;
 use osteon_solver::picking::{Window, array_rank};
 
 use crate::array_geometry::ArrayGeometry;
@@ -36,7 +37,10 @@ impl PickRefusal {
 pub(crate) struct ArrayDecision<'a> {
     aligned: AlignedArray<'a>,
     stacked: StackedSignal,
-    rank: usize,
+    /// The number of the common extremum that is picked.
+    pub(crate) rank: usize,
+    /// The same of the other one, if the signals have it.
+    pub(crate) other_rank: Option<usize>,
     /// How clear it is that no earlier extremum is the first, from 0 to 1: half of the threshold or less below
     /// it and twice the threshold or more above it are clear.
     pub(crate) clarity: f64,
@@ -89,18 +93,22 @@ impl<'a> ArrayDecision<'a> {
                 "the first packet lacks the extremum that is picked before the direct wave arrives",
             )
         })?;
+        let criterion = &geometry.criterion;
+        let other = Picking { extremum: criterion.extremum.other(), ..*criterion };
+        let other_rank = array_rank(&other, fc, &windows).ok().map(|found| found.rank);
+        let other_rank = other_rank.filter(|rank| *rank < stacked.extrema.len());
         let clear_above = 2.0 * (1.0 - threshold / found.ratio);
         let clear_below = 2.0 * (1.0 - found.skipped / threshold);
         let clarity = clear_above.min(clear_below).clamp(0.0, 1.0);
-        Ok(Self { aligned, stacked, rank: found.rank, clarity })
+        Ok(Self { aligned, stacked, rank: found.rank, other_rank, clarity })
     }
 
-    /// Returns the picked extremum of a receiver.
+    /// Returns the extremum of a receiver that belongs to the common one of this number.
     ///
     /// # Errors
     /// If its signal is not as those of the others.
-    pub(crate) fn pick(&self, r: usize) -> Result<CurvedExtremum, PickFailure> {
-        let common = &self.stacked.extrema[self.rank];
+    pub(crate) fn pick(&self, r: usize, rank: usize) -> Result<CurvedExtremum, PickFailure> {
+        let common = &self.stacked.extrema[rank];
         let (signal, period) = (&self.aligned.signals[r], self.aligned.period);
         let expected = self.aligned.time(r, common.time);
         // Half a period after an extremum the next one begins, which may be clipped.

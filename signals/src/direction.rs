@@ -9,6 +9,7 @@ use crate::array_decision::{ArrayDecision, PickRefusal};
 use crate::array_geometry::ArrayGeometry;
 use crate::array_signals::ArraySignals;
 use crate::band_filter::BandFilter;
+use crate::first_signal::{FirstSignalEstimate, Measured, decay_of, frequency_of};
 use crate::interpolation::{CurvedExtremum, SampleSlopes};
 use crate::moveout_fit::{self, LOST_MAX, PickedTime};
 use crate::pick_failure::PickFailure;
@@ -31,6 +32,8 @@ pub struct ReceiverPick {
     pub time: Option<f64>,
     /// Standard error of the time from the signal's noise, s; 0 if the noise is unknown.
     pub standard_error: f64,
+    /// Size of the extremum, in the unit of the signals, if there is one.
+    pub amplitude: Option<Measured>,
     /// Why the time is not used.
     pub failure: Option<PickFailure>,
 }
@@ -51,6 +54,8 @@ pub struct VelocityEstimate {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DirectionPick {
     pub(crate) estimate: Result<VelocityEstimate, PickRefusal>,
+    /// The rest of what the first signal tells, if it has a velocity.
+    pub(crate) first_signal: FirstSignalEstimate,
     pub(crate) receivers: Vec<ReceiverPick>,
 }
 
@@ -63,7 +68,8 @@ pub(crate) fn pick_direction(
 ) -> DirectionPick {
     let signals = signals(geometry, layout, recorded, raw);
     let mut receivers = vec![ReceiverPick::default(); signals.len()];
-    let mut estimate = estimate(geometry, &signals, &mut receivers);
+    let mut first_signal = FirstSignalEstimate::default();
+    let mut estimate = estimate(geometry, &signals, &mut receivers, &mut first_signal);
     if let Err(refusal) = &mut estimate
         && refusal.failure == PickFailure::TooNoisy
         && layout.band.is_empty()
@@ -71,7 +77,7 @@ pub(crate) fn pick_direction(
         let edge = BAND_EDGE * geometry.center_frequency;
         refusal.detail += &format!("; [signals] band = [0.0, {edge:?}] filters noise");
     }
-    DirectionPick { estimate, receivers }
+    DirectionPick { estimate, first_signal, receivers }
 }
 
 /// Filters the signals and finds their extrema.
@@ -98,11 +104,12 @@ fn signals(
         .collect()
 }
 
-/// Returns the velocity, and enters times and failures of the receivers.
+/// Returns the velocity, and enters times and failures of the receivers and what else the first signal tells.
 fn estimate(
     geometry: &ArrayGeometry,
     signals: &[ReceiverSignal],
     receivers: &mut [ReceiverPick],
+    first_signal: &mut FirstSignalEstimate,
 ) -> Result<VelocityEstimate, PickRefusal> {
     let mut sizes: Vec<f64> = signals.iter().map(|signal| signal.largest).collect();
     let typical = median(&mut sizes);
@@ -119,27 +126,49 @@ fn estimate(
     }
     enough(receivers)?;
     let decision = ArrayDecision::make(geometry, signals, &packets)?;
-    let period = 1.0 / geometry.center_frequency;
+    let mut others = receivers.to_vec();
+    enter_picks(geometry, signals, receivers, |r| decision.pick(r, decision.rank));
+    enough(receivers)?;
+    let found = velocity(geometry, receivers, decision.clarity)?;
+    first_signal.decay = decay_of(&geometry.distances, receivers);
+    if let Some(rank) = decision.other_rank {
+        enter_picks(geometry, signals, &mut others, |r| decision.pick(r, rank));
+        let other = enough(&others).and_then(|()| velocity(geometry, &mut others, 1.0));
+        if let Ok(VelocityEstimate { velocity: value, standard_error, .. }) = other {
+            first_signal.other_velocity = Some(Measured { value, standard_error });
+            first_signal.center_frequency = frequency_of(receivers, &others);
+        }
+    }
+    Ok(found)
+}
+
+/// Enters the extremum that `pick` finds for each receiver, or why there is none.
+fn enter_picks(
+    geometry: &ArrayGeometry,
+    signals: &[ReceiverSignal],
+    receivers: &mut [ReceiverPick],
+    pick: impl Fn(usize) -> Result<CurvedExtremum, PickFailure>,
+) {
     for (r, receiver) in receivers.iter_mut().enumerate() {
         if receiver.failure == Some(PickFailure::DeadReceiver) {
             continue;
         }
-        match decision.pick(r) {
+        match pick(r) {
             Ok(pick) => {
                 let noise = signals[r].noise.unwrap_or_default();
+                let size = pick.at.pressure.abs();
                 receiver.time = Some(pick.at.time);
                 receiver.standard_error = noise.slope / pick.curvature.abs();
+                receiver.amplitude = Some(Measured { value: size, standard_error: noise.value });
                 let turns = 2.0 * PI * geometry.center_frequency;
-                let usual = pick.at.pressure.abs() * turns * turns;
-                let is_noisy = receiver.standard_error > ERROR_PERIODS_MAX * period
-                    || noise.curvature > NOISE_CURVATURE_MAX * usual;
+                let is_noisy = receiver.standard_error
+                    > ERROR_PERIODS_MAX / geometry.center_frequency
+                    || noise.curvature > NOISE_CURVATURE_MAX * size * turns * turns;
                 receiver.failure = is_noisy.then_some(PickFailure::TooNoisy);
             }
             Err(failure) => receiver.failure = Some(failure),
         }
     }
-    enough(receivers)?;
-    velocity(geometry, receivers, decision.clarity, period)
 }
 
 /// Fits the velocity to the receivers' times, and enters which are rejected.
@@ -147,8 +176,8 @@ fn velocity(
     geometry: &ArrayGeometry,
     receivers: &mut [ReceiverPick],
     clarity: f64,
-    period: f64,
 ) -> Result<VelocityEstimate, PickRefusal> {
+    let period = 1.0 / geometry.center_frequency;
     let times: Vec<_> = receivers
         .iter()
         .map(|receiver| {

@@ -8,12 +8,14 @@ use serde::Serialize;
 
 use crate::array_decision::PickRefusal;
 use crate::direction::{ReceiverPick, VelocityEstimate};
+use crate::first_signal::Measured;
 use crate::pick_failure::PickFailure;
 use crate::series_pick::SeriesPick;
 use crate::waves::{WaveFailure, WavePick, WaveTarget};
 
 /// The header of the CSV file.
-const COLUMNS: &str = "velocity,standard_error,quality,failure";
+const COLUMNS: &str = "velocity,standard_error,quality,failure,other_velocity,other_standard_error,decay,\
+                       decay_standard_error,center_frequency,center_frequency_standard_error";
 
 /// A series of a file, with its pick.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,15 +41,19 @@ impl PickedSeries {
 }
 
 /// Returns the rows of all series as CSV: velocity and standard error in m/s, empty if there is none; quality
-/// from 0 to 1; the name of the failure, empty if there is none; and likewise for the guided waves `targets` of
-/// each series. Comments above them state the criterion.
+/// from 0 to 1; the name of the failure, empty if there is none; the other velocity (m/s), decay (dB/cm) and centre
+/// frequency (Hz) with their standard errors, empty if there is none; and likewise for the guided waves `targets`
+/// of each series. Comments above them state the criterion.
 pub fn to_csv(series: &[PickedSeries], targets: &[WaveTarget], picking: &Picking) -> String {
     let names = targets.iter().flat_map(WaveTarget::columns);
     let header: Vec<String> = std::iter::once(COLUMNS.to_owned()).chain(names).collect();
     let head = picking_comment::of_picking(picking) + &header.join(",") + "\n";
     let row = |one: &PickedSeries| {
         let waves: String = one.waves.iter().map(wave_fields).collect();
-        format!("{}{waves}\n", velocity_fields(&one.pick))
+        let first = one.pick.first_signal;
+        let others = [first.other_velocity, first.decay, first.center_frequency];
+        let others: String = others.into_iter().map(measured_fields).collect();
+        format!("{}{others}{waves}\n", velocity_fields(&one.pick))
     };
     std::iter::once(head).chain(series.iter().map(row)).collect()
 }
@@ -59,6 +65,10 @@ fn velocity_fields(pick: &SeriesPick) -> String {
         }
         Err(refusal) => format!(",,0.0,{}", refusal.failure.name()),
     }
+}
+
+fn measured_fields(found: Option<Measured>) -> String {
+    found.map_or(",,".to_owned(), |it| format!(",{:?},{:?}", it.value, it.standard_error))
 }
 
 fn wave_fields(pick: &WavePick) -> String {
@@ -83,8 +93,23 @@ struct SeriesJson<'a> {
     failure: Option<PickFailure>,
     detail: Option<&'a str>,
     directions: Option<[f64; 2]>,
+    other_velocity: Option<MeasuredJson>,
+    decay: Option<MeasuredJson>,
+    center_frequency: Option<MeasuredJson>,
     receivers: Vec<ReceiverJson>,
     waves: Vec<WaveJson>,
+}
+
+#[derive(Serialize)]
+struct MeasuredJson {
+    value: f64,
+    standard_error: f64,
+}
+
+impl From<Measured> for MeasuredJson {
+    fn from(Measured { value, standard_error }: Measured) -> Self {
+        Self { value, standard_error }
+    }
 }
 
 #[derive(Serialize)]
@@ -101,6 +126,7 @@ struct ReceiverJson {
     x1: f64,
     time: Option<f64>,
     standard_error: Option<f64>,
+    amplitude: Option<MeasuredJson>,
     failure: Option<PickFailure>,
 }
 
@@ -116,8 +142,10 @@ pub fn to_json(
         let estimate = one.estimate();
         let receivers = one.positions.iter().zip(&one.pick.receivers);
         let receivers = receivers.map(|(&x1, receiver)| {
-            let &ReceiverPick { time, standard_error, failure } = receiver;
-            ReceiverJson { x1, time, standard_error: time.map(|_| standard_error), failure }
+            let &ReceiverPick { time, standard_error, amplitude, failure } = receiver;
+            let standard_error = time.map(|_| standard_error);
+            let amplitude = amplitude.map(MeasuredJson::from);
+            ReceiverJson { x1, time, standard_error, amplitude, failure }
         });
         (estimate, receivers.collect())
     };
@@ -126,6 +154,7 @@ pub fn to_json(
             .iter()
             .map(|picked| {
                 let (estimate, receivers) = one(picked);
+                let first = picked.pick.first_signal;
                 SeriesJson {
                     file: picked.file.to_string_lossy().into_owned(),
                     velocity: estimate.map(|it| it.velocity),
@@ -134,6 +163,9 @@ pub fn to_json(
                     failure: picked.refusal().map(|it| it.failure),
                     detail: picked.refusal().map(|it| it.detail.as_str()),
                     directions: picked.pick.directions,
+                    other_velocity: first.other_velocity.map(MeasuredJson::from),
+                    decay: first.decay.map(MeasuredJson::from),
+                    center_frequency: first.center_frequency.map(MeasuredJson::from),
                     receivers,
                     waves: picked.waves.iter().map(wave_json).collect(),
                 }

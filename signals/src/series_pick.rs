@@ -8,6 +8,8 @@ use crate::array_decision::PickRefusal;
 use crate::array_geometry::ArrayGeometry;
 use crate::array_signals::{ArraySignals, SignalSeries};
 use crate::direction::{DirectionPick, ReceiverPick, VelocityEstimate, pick_direction};
+use crate::first_signal::{FirstSignalEstimate, Measured};
+use crate::pick_failure::PickFailure;
 
 /// The velocity of a series, and what each receiver contributed.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +18,8 @@ pub struct SeriesPick {
     pub estimate: Result<VelocityEstimate, PickRefusal>,
     /// Velocities for the first and the second source, m/s, if the series has both.
     pub directions: Option<[f64; 2]>,
+    /// What else the first signal tells, if it has a velocity.
+    pub first_signal: FirstSignalEstimate,
     /// The receivers in their order along the probe, for the first of the series' sources.
     pub receivers: Vec<ReceiverPick>,
 }
@@ -43,29 +47,20 @@ impl SeriesPicker {
     pub fn pick(&self, series: &SignalSeries) -> SeriesPick {
         // The model has a source at either end; those beyond them only tell waves apart.
         let ends = series.directions.iter().filter(|array| array.offset == 0.0);
-        let picks: Vec<_> = ends.map(|array| self.direction(array)).collect();
-        let receivers = picks.first().map(|pick| pick.receivers.clone()).unwrap_or_default();
-        let both = match picks.as_slice() {
-            [one, other] => Some((one, other)),
-            _ => None,
-        };
-        let Some((one, other)) = both else {
-            let refusal = || {
-                let detail = "the series has no signals";
-                Err(PickRefusal::new(crate::pick_failure::PickFailure::NoArrival, detail))
+        let mut picks = ends.map(|array| self.direction(array));
+        let Some(one) = picks.next() else {
+            let refusal = PickRefusal::new(PickFailure::NoArrival, "the series has no signals");
+            return SeriesPick {
+                estimate: Err(refusal),
+                directions: None,
+                first_signal: FirstSignalEstimate::default(),
+                receivers: Vec::new(),
             };
-            let estimate = picks.into_iter().next().map_or_else(refusal, |pick| pick.estimate);
-            return SeriesPick { estimate, directions: None, receivers };
         };
-        match (&one.estimate, &other.estimate) {
-            (Ok(one), Ok(other)) => SeriesPick {
-                estimate: Ok(harmonic_mean(one, other)),
-                directions: Some([one.velocity, other.velocity]),
-                receivers,
-            },
-            (Err(refusal), _) | (_, Err(refusal)) => {
-                SeriesPick { estimate: Err(refusal.clone()), directions: None, receivers }
-            }
+        let DirectionPick { estimate, first_signal, receivers } = one;
+        match picks.next() {
+            Some(other) => of_both(estimate, first_signal, receivers, other),
+            None => SeriesPick { estimate, directions: None, first_signal, receivers },
         }
     }
 
@@ -85,17 +80,51 @@ impl SeriesPicker {
     }
 }
 
-/// Returns the harmonic mean of the velocities of both sources, whose errors are independent.
-fn harmonic_mean(one: &VelocityEstimate, other: &VelocityEstimate) -> VelocityEstimate {
-    let velocity = 1.0 / mean(&[1.0 / one.velocity, 1.0 / other.velocity]);
+/// Joins what both sources tell: the velocities, and of the first one the rest.
+fn of_both(
+    estimate: Result<VelocityEstimate, PickRefusal>,
+    first_signal: FirstSignalEstimate,
+    receivers: Vec<ReceiverPick>,
+    other: DirectionPick,
+) -> SeriesPick {
+    let velocities = |one: VelocityEstimate| Ok((one, other.estimate?));
+    match estimate.and_then(velocities) {
+        Ok((one, two)) => SeriesPick {
+            estimate: Ok(harmonic_mean(one, two)),
+            directions: Some([one.velocity, two.velocity]),
+            first_signal: FirstSignalEstimate {
+                other_velocity: first_signal
+                    .other_velocity
+                    .zip(other.first_signal.other_velocity)
+                    .map(|(one, two)| harmonic_mean_of(one, two)),
+                ..first_signal
+            },
+            receivers,
+        },
+        Err(refusal) => SeriesPick {
+            estimate: Err(refusal),
+            directions: None,
+            first_signal: FirstSignalEstimate::default(),
+            receivers,
+        },
+    }
+}
+
+fn harmonic_mean(one: VelocityEstimate, other: VelocityEstimate) -> VelocityEstimate {
+    let measured =
+        |it: VelocityEstimate| Measured { value: it.velocity, standard_error: it.standard_error };
+    let Measured { value, standard_error } = harmonic_mean_of(measured(one), measured(other));
+    let quality = one.quality.min(other.quality);
+    VelocityEstimate { velocity: value, standard_error, quality }
+}
+
+/// Returns the harmonic mean of two velocities, whose errors are independent.
+fn harmonic_mean_of(one: Measured, other: Measured) -> Measured {
+    let value = 1.0 / mean(&[1.0 / one.value, 1.0 / other.value]);
     // The derivative of the mean with respect to each velocity.
-    let part = |of: &VelocityEstimate| {
-        let ratio = velocity / of.velocity;
+    let part = |of: Measured| {
+        let ratio = value / of.value;
         0.5 * ratio * ratio * of.standard_error
     };
-    VelocityEstimate {
-        velocity,
-        standard_error: libm::hypot(part(one), part(other)),
-        quality: one.quality.min(other.quality),
-    }
+    Measured { value, standard_error: libm::hypot(part(one), part(other)) }
 }

@@ -4,8 +4,11 @@
 
 mod support;
 
+use osteon_common::case::Setup;
 use osteon_common::signal_layout::Transmitter;
-use osteon_signals::SignalSeries;
+use osteon_files::probe_file::ProbeDescription;
+use osteon_signals::{Measured, SignalSeries};
+use osteon_solver::{Isa, Solver, Workspace};
 use support::{CASE, CLEAN, description, packet_peak, pick, signals, with_noise};
 
 /// What many noisy series give.
@@ -75,4 +78,45 @@ fn at_20_decibels_intervals_hold() {
 fn finely_sampled_signals_lose_nothing() {
     let fine = signals(&CASE.setup, Transmitter::First, 4e-9);
     check(&SignalSeries { directions: vec![fine] }, 20.0, 2.0, 0);
+}
+
+/// Returns other velocity, decay and centre frequency of a series.
+fn others(probe: &ProbeDescription, series: &SignalSeries) -> [Measured; 3] {
+    let found = pick(probe, series).first_signal;
+    [found.other_velocity, found.decay, found.center_frequency].map(Option::unwrap)
+}
+
+#[test]
+fn what_else_the_first_signal_tells_is_the_models() {
+    let mut setup = Setup::clone(&CASE.setup);
+    setup.solver.refinement = 4.0;
+    let (solver, mut workspace) = (Solver::with_isa(&setup, Isa::fastest()), Workspace::default());
+    let arrival = solver.arrival(&CASE.bone, &mut workspace).unwrap();
+    let series = SignalSeries { directions: vec![signals(&setup, Transmitter::First, 2e-8)] };
+    let model = solver.first_signal(&CASE.bone, &arrival, &mut workspace);
+    let expected = [model.other_velocity.unwrap(), model.decay, model.center_frequency.unwrap()];
+    // Amplitudes of both are less accurate than times.
+    let tolerances = [1e-5, 1e-4, 1e-5];
+    for ((found, expected), tolerance) in
+        others(&description(None), &series).iter().zip(expected).zip(tolerances)
+    {
+        assert!((found.value / expected - 1.0).abs() < tolerance, "{} {expected}", found.value);
+    }
+}
+
+#[test]
+fn intervals_of_the_others_hold() {
+    let probe = description(Some([0.0, 2.5e6]));
+    // The filter moves them a little.
+    let exact = others(&probe, &CLEAN).map(|found| found.value);
+    let deviation = packet_peak(&CLEAN) * libm::pow(10.0, -30.0 / 20.0);
+    let mut held = [0.0; 3];
+    for seed in 0..400 {
+        let found = others(&probe, &with_noise(&CLEAN, deviation, seed));
+        for ((held, found), exact) in held.iter_mut().zip(found).zip(exact) {
+            let within = (found.value - exact).abs() <= 1.96 * found.standard_error;
+            *held += f64::from(within) / 400.0;
+        }
+    }
+    assert!(held.iter().all(|share| (0.92..=0.98).contains(share)), "{held:?}");
 }
