@@ -1,6 +1,7 @@
 //! Charts: what is drawn, as numbers. [`Chart::svg`] draws it, and [`Chart::csv`] writes the numbers.
 
 mod draw;
+mod file_style;
 mod frame;
 mod raster;
 mod scale;

@@ -8,6 +8,7 @@ mod deny;
 mod deploy;
 mod digests;
 mod fleet;
+mod gallery;
 mod manual;
 mod metrics;
 mod peers;
@@ -137,6 +138,11 @@ const VERBS: &[Verb] = &[
                 "reference",
                 "what docs/ takes from the program: tables of keys, schemas, pages of references",
                 Action::Function(reference::write),
+            ),
+            (
+                "gallery",
+                "docs/gallery.md with its pictures, by the release (three minutes)",
+                Action::Function(gallery::write),
             ),
             (
                 "tables",

@@ -1,15 +1,16 @@
-//! Charts as SVG, with a title and a description for screen readers, and colours that follow the
-//! reader's choice of a light or dark page.
+//! Charts as SVG, with a title and a description for screen readers. In a page their colours follow the reader's
+//! choice of light or dark.
 
 use std::fmt::Write as _;
 
+use super::file_style::file_style;
 use super::frame::{Frame, coordinate};
 use super::raster::{cells, colour_bar, key_width};
 use super::scale::Tick;
 use super::{Axis, AxisScale, Chart, ChartLayer, Ink, Shape};
 use crate::text::{escape, shorten};
 
-/// Colours and strokes of charts, for a page that contains them and for files of their own.
+/// Colours and strokes of the charts of a page.
 pub(crate) const STYLE: &str = include_str!("chart.css");
 
 /// Width of a chart.
@@ -33,7 +34,7 @@ impl Chart {
 
     /// Returns the chart as a file of its own.
     pub(crate) fn svg_file(&self) -> String {
-        let style = format!("<style>{STYLE}</style>");
+        let style = format!("<style>{}</style>", file_style());
         format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}\n", self.draw(&style))
     }
 
@@ -372,9 +373,9 @@ mod tests {
     }
 
     #[test]
-    fn a_file_has_its_own_colours_for_light_and_dark() {
+    fn a_file_has_its_own_style() {
         let file = chart().svg_file();
-        assert!(file.starts_with("<?xml") && file.contains("prefers-color-scheme: dark"), "{file}");
+        assert!(file.starts_with("<?xml") && file.contains("<style>.chart{font:"), "{file}");
     }
 
     #[test]
