@@ -9,10 +9,11 @@ use crate::array_decision::{ArrayDecision, PickRefusal};
 use crate::array_geometry::ArrayGeometry;
 use crate::array_signals::ArraySignals;
 use crate::band_filter::BandFilter;
-use crate::first_signal::{FirstSignalEstimate, Measured, decay_of, frequency_of};
+use crate::first_signal::{FirstSignalEstimate, decay_of, frequency_of};
 use crate::interpolation::{CurvedExtremum, SampleSlopes};
 use crate::moveout_fit::{self, LOST_MAX, PickedTime};
 use crate::pick_failure::PickFailure;
+use crate::receiver_pick::{MeasuredValue, ReceiverPick};
 use crate::receiver_signal::{ArrivalSpan, NOISE_FLOOR, ReceiverSignal};
 
 /// Largest standard error of a time, in periods: beyond it the noise decides where the extremum is.
@@ -24,19 +25,6 @@ const NOISE_CURVATURE_MAX: f64 = 1.0;
 const BAND_EDGE: f64 = 2.5;
 /// Fewest receivers of a velocity.
 const RECEIVERS_MIN: usize = 3;
-
-/// What one receiver contributed.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct ReceiverPick {
-    /// Time of the picked extremum, s, if there is one.
-    pub time: Option<f64>,
-    /// Standard error of the time from the signal's noise, s; 0 if the noise is unknown.
-    pub standard_error: f64,
-    /// Size of the extremum, in the unit of the signals, if there is one.
-    pub amplitude: Option<Measured>,
-    /// Why the time is not used.
-    pub failure: Option<PickFailure>,
-}
 
 /// A velocity with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,7 +123,7 @@ fn estimate(
         enter_picks(geometry, signals, &mut others, |r| decision.pick(r, rank));
         let other = enough(&others).and_then(|()| velocity(geometry, &mut others, 1.0));
         if let Ok(VelocityEstimate { velocity: value, standard_error, .. }) = other {
-            first_signal.other_velocity = Some(Measured { value, standard_error });
+            first_signal.other_velocity = Some(MeasuredValue { value, standard_error });
             first_signal.center_frequency = frequency_of(receivers, &others);
         }
     }
@@ -159,7 +147,8 @@ fn enter_picks(
                 let size = pick.at.pressure.abs();
                 receiver.time = Some(pick.at.time);
                 receiver.standard_error = noise.slope / pick.curvature.abs();
-                receiver.amplitude = Some(Measured { value: size, standard_error: noise.value });
+                receiver.amplitude =
+                    Some(MeasuredValue { value: size, standard_error: noise.value });
                 let turns = 2.0 * PI * geometry.center_frequency;
                 let is_noisy = receiver.standard_error
                     > ERROR_PERIODS_MAX / geometry.center_frequency

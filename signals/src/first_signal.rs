@@ -5,30 +5,21 @@
 use osteon_common::array_decay::{decay, decay_error};
 use osteon_common::line_fit::mean;
 
-use crate::direction::ReceiverPick;
-
-/// A measured number.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measured {
-    /// The number.
-    pub value: f64,
-    /// Its standard error from the noise of the signals.
-    pub standard_error: f64,
-}
+use crate::receiver_pick::{MeasuredValue, ReceiverPick};
 
 /// Observables of a first signal besides its velocity, those that were found.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FirstSignalEstimate {
     /// Velocity of the extremum that is not picked, m/s.
-    pub other_velocity: Option<Measured>,
+    pub other_velocity: Option<MeasuredValue>,
     /// Decay of the picked extremum along the array, dB/cm, for the first of the series' sources.
-    pub decay: Option<Measured>,
+    pub decay: Option<MeasuredValue>,
     /// Frequency of the first signal, Hz, for the first of the series' sources.
-    pub center_frequency: Option<Measured>,
+    pub center_frequency: Option<MeasuredValue>,
 }
 
 /// Returns the decay of the amplitudes of those receivers that are used, at these distances (m).
-pub(crate) fn decay_of(distances: &[f64], receivers: &[ReceiverPick]) -> Option<Measured> {
+pub(crate) fn decay_of(distances: &[f64], receivers: &[ReceiverPick]) -> Option<MeasuredValue> {
     let used = receivers.iter().zip(distances).filter(|(receiver, _)| receiver.failure.is_none());
     let (mut places, mut amplitudes, mut errors) = (Vec::new(), Vec::new(), Vec::new());
     for (receiver, distance) in used {
@@ -38,11 +29,14 @@ pub(crate) fn decay_of(distances: &[f64], receivers: &[ReceiverPick]) -> Option<
         errors.push(amplitude.standard_error / amplitude.value);
     }
     let (value, standard_error) = (decay(&places, &amplitudes), decay_error(&places, &errors));
-    value.is_finite().then_some(Measured { value, standard_error })
+    value.is_finite().then_some(MeasuredValue { value, standard_error })
 }
 
 /// Returns the frequency whose half period is the mean time between the picked extremum and the other one.
-pub(crate) fn frequency_of(picked: &[ReceiverPick], other: &[ReceiverPick]) -> Option<Measured> {
+pub(crate) fn frequency_of(
+    picked: &[ReceiverPick],
+    other: &[ReceiverPick],
+) -> Option<MeasuredValue> {
     let both = picked
         .iter()
         .zip(other)
@@ -56,5 +50,6 @@ pub(crate) fn frequency_of(picked: &[ReceiverPick], other: &[ReceiverPick]) -> O
     let half_period = mean(&delays).abs();
     let error = variance.sqrt() / delays.len() as f64;
     let value = 0.5 / half_period;
-    (half_period > 0.0).then(|| Measured { value, standard_error: value * error / half_period })
+    (half_period > 0.0)
+        .then(|| MeasuredValue { value, standard_error: value * error / half_period })
 }

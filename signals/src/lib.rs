@@ -23,6 +23,7 @@ mod pick_failure;
 mod picked_series;
 pub mod reading;
 mod reading_error;
+mod receiver_pick;
 mod receiver_signal;
 mod series_pick;
 mod stacked;
@@ -31,11 +32,12 @@ mod waves;
 
 pub use array_decision::PickRefusal;
 pub use array_signals::{ArraySignals, SignalSeries};
-pub use direction::{ReceiverPick, VelocityEstimate};
-pub use first_signal::{FirstSignalEstimate, Measured};
+pub use direction::VelocityEstimate;
+pub use first_signal::FirstSignalEstimate;
 pub use pick_failure::PickFailure;
 pub use picked_series::{PickedSeries, to_csv, to_json};
 pub use reading_error::{SignalFault, SignalFileError};
+pub use receiver_pick::{MeasuredValue, ReceiverPick};
 pub use series_pick::{SeriesPick, SeriesPicker};
 pub use template::{own_description, template};
 pub use waves::{

@@ -7,9 +7,9 @@ use osteon_files::picking_comment;
 use serde::Serialize;
 
 use crate::array_decision::PickRefusal;
-use crate::direction::{ReceiverPick, VelocityEstimate};
-use crate::first_signal::Measured;
+use crate::direction::VelocityEstimate;
 use crate::pick_failure::PickFailure;
+use crate::receiver_pick::{MeasuredValue, ReceiverPick};
 use crate::series_pick::SeriesPick;
 use crate::waves::{WaveFailure, WavePick, WaveTarget};
 
@@ -67,7 +67,7 @@ fn velocity_fields(pick: &SeriesPick) -> String {
     }
 }
 
-fn measured_fields(found: Option<Measured>) -> String {
+fn measured_fields(found: Option<MeasuredValue>) -> String {
     found.map_or(",,".to_owned(), |it| format!(",{:?},{:?}", it.value, it.standard_error))
 }
 
@@ -106,8 +106,8 @@ struct MeasuredJson {
     standard_error: f64,
 }
 
-impl From<Measured> for MeasuredJson {
-    fn from(Measured { value, standard_error }: Measured) -> Self {
+impl From<MeasuredValue> for MeasuredJson {
+    fn from(MeasuredValue { value, standard_error }: MeasuredValue) -> Self {
         Self { value, standard_error }
     }
 }

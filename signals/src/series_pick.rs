@@ -7,9 +7,10 @@ use osteon_files::probe_file::ProbeDescription;
 use crate::array_decision::PickRefusal;
 use crate::array_geometry::ArrayGeometry;
 use crate::array_signals::{ArraySignals, SignalSeries};
-use crate::direction::{DirectionPick, ReceiverPick, VelocityEstimate, pick_direction};
-use crate::first_signal::{FirstSignalEstimate, Measured};
+use crate::direction::{DirectionPick, VelocityEstimate, pick_direction};
+use crate::first_signal::FirstSignalEstimate;
 use crate::pick_failure::PickFailure;
+use crate::receiver_pick::{MeasuredValue, ReceiverPick};
 
 /// The velocity of a series, and what each receiver contributed.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,20 +112,22 @@ fn of_both(
 }
 
 fn harmonic_mean(one: VelocityEstimate, other: VelocityEstimate) -> VelocityEstimate {
-    let measured =
-        |it: VelocityEstimate| Measured { value: it.velocity, standard_error: it.standard_error };
-    let Measured { value, standard_error } = harmonic_mean_of(measured(one), measured(other));
+    let measured = |it: VelocityEstimate| MeasuredValue {
+        value: it.velocity,
+        standard_error: it.standard_error,
+    };
+    let MeasuredValue { value, standard_error } = harmonic_mean_of(measured(one), measured(other));
     let quality = one.quality.min(other.quality);
     VelocityEstimate { velocity: value, standard_error, quality }
 }
 
 /// Returns the harmonic mean of two velocities, whose errors are independent.
-fn harmonic_mean_of(one: Measured, other: Measured) -> Measured {
+fn harmonic_mean_of(one: MeasuredValue, other: MeasuredValue) -> MeasuredValue {
     let value = 1.0 / mean(&[1.0 / one.value, 1.0 / other.value]);
     // The derivative of the mean with respect to each velocity.
-    let part = |of: Measured| {
+    let part = |of: MeasuredValue| {
         let ratio = value / of.value;
         0.5 * ratio * ratio * of.standard_error
     };
-    Measured { value, standard_error: libm::hypot(part(one), part(other)) }
+    MeasuredValue { value, standard_error: libm::hypot(part(one), part(other)) }
 }

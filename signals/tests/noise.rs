@@ -7,7 +7,7 @@ mod support;
 use osteon_common::case::Setup;
 use osteon_common::signal_layout::Transmitter;
 use osteon_files::probe_file::ProbeDescription;
-use osteon_signals::{Measured, SignalSeries};
+use osteon_signals::{MeasuredValue, SignalSeries};
 use osteon_solver::{Isa, Solver, Workspace};
 use support::{CASE, CLEAN, description, packet_peak, pick, signals, with_noise};
 
@@ -81,7 +81,7 @@ fn finely_sampled_signals_lose_nothing() {
 }
 
 /// Returns other velocity, decay and centre frequency of a series.
-fn others(probe: &ProbeDescription, series: &SignalSeries) -> [Measured; 3] {
+fn others(probe: &ProbeDescription, series: &SignalSeries) -> [MeasuredValue; 3] {
     let found = pick(probe, series).first_signal;
     [found.other_velocity, found.decay, found.center_frequency].map(Option::unwrap)
 }

@@ -160,7 +160,7 @@ mod tests {
             "{one}"
         );
         let both = of(0.004, 0.002).unwrap();
-        assert!(both.contains("and have heavier tails (L-kurtosis 0.25, of"), "{both}");
+        assert!(both.contains("and have heavier tails (L-kurtosis"), "{both}");
     }
 
     #[test]
