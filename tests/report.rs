@@ -81,6 +81,32 @@ fn a_report_shows_the_numbers_of_the_result() {
     assert!(first == files(&out.join("report")));
 }
 
+/// The page shows what pooled groups share, and each group with and without the others.
+#[test]
+fn pooled_groups_have_a_table_and_a_figure_of_both_values() {
+    let scratch = Scratch::new();
+    let group = |k: u32| -> String {
+        let velocities = (0..6).map(|j| (3850 + 30 * k + (37 * j + 11 * k) % 120).to_string());
+        format!("G{k} = [{}]\n", velocities.collect::<Vec<_>>().join(", "))
+    };
+    let groups: String = (0..4).map(group).collect();
+    let job = format!(
+        "[data.groups]\n{groups}[groups]\npooled = true\n[parameters]\nlongitudinal_young_modulus = \
+         {{ bounds = [12e9, 25e9] }}\ndispersion = {{ start = 0.05, bounds = [0.005, 0.3] }}\n[monte_carlo]\n\
+         realizations = 64\nsampling = \"sobol\"\n[search]\nmethod = \"newton\"\n"
+    );
+    let (file, out) = (scratch.write("job.toml", &job), scratch.path("out"));
+    run(&["identify", text(&file), "--out", text(&out), "--report", "--no-budget"]).succeeded();
+    let report = files(&out.join("report"));
+    let page = &report["index.html"];
+    let result = fs::read_to_string(out.join("result.json")).unwrap();
+    let result: Value = serde_json::from_str(&result).unwrap();
+    numbers_are_those_of(page, &result);
+    assert!(page.contains("What the groups share"), "{}", result["pooling"]);
+    let svg = &report["groups-bulk-velocity.svg"];
+    assert_eq!(svg.matches("data-name=\"with the help of all groups\"").count(), 1, "{svg}");
+}
+
 #[test]
 fn a_simulation_and_two_results_have_reports() {
     let scratch = Scratch::new();

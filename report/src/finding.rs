@@ -10,7 +10,7 @@ use osteon_common::parameters::Parameter;
 use osteon_common::results::Status;
 use osteon_files::report::{
     Data, EstimatedErrors, Group, Identification, Identified, MeanModel, ParameterProfile,
-    PosteriorReport, Propagation, QuantityBudget, Solutions, Solver, Velocity,
+    PooledEstimate, PosteriorReport, Propagation, QuantityBudget, Solutions, Solver, Velocity,
 };
 
 use crate::figure_names;
@@ -50,6 +50,8 @@ pub(crate) struct Finding<'a> {
     /// The solutions from several starts.
     pub(crate) solutions: Option<&'a Solutions>,
     pub(crate) posterior: Option<&'a PosteriorReport>,
+    /// Values that were found with the help of other groups, if groups are pooled.
+    pub(crate) pooled: Option<&'a BTreeMap<String, PooledEstimate>>,
     pub(crate) realizations: u64,
     /// First evaluation below the sampling noise.
     pub(crate) below_noise_from: Option<u64>,
@@ -95,6 +97,7 @@ impl<'a> Finding<'a> {
             profiles: Some(&result.profiles),
             solutions: result.solutions.as_ref(),
             posterior: result.posterior(),
+            pooled: None,
             realizations: result.realizations,
             below_noise_from: result.search.below_noise_from,
             solver: Some(&result.solver),
@@ -128,6 +131,7 @@ impl<'a> Finding<'a> {
             profiles: Some(&group.profiles),
             solutions: group.solutions.as_ref(),
             posterior: group.posterior.as_ref(),
+            pooled: Some(&group.pooled),
             realizations: result.realizations,
             below_noise_from: None,
             solver: None,
@@ -157,6 +161,7 @@ impl<'a> Finding<'a> {
             profiles: None,
             solutions: None,
             posterior: None,
+            pooled: None,
             realizations: result.realizations,
             below_noise_from: None,
             solver: Some(&result.solver),

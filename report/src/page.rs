@@ -3,6 +3,7 @@
 mod difference;
 mod groups;
 mod markup;
+mod pooling;
 mod provenance;
 mod results;
 mod simulation;
@@ -124,6 +125,11 @@ fn run_sections(
             let grouped = findings.iter().any(|finding| finding.group.is_some());
             if grouped {
                 sections.push(section("Results", groups::table(&numbers, findings)));
+                if let RunContent::Identification(result, _) = &run.content
+                    && let Some(found) = &result.pooling
+                {
+                    sections.push(section("All groups", pooling::shared(&numbers, found)));
+                }
                 if let Some(matrix) = groups::differences(context, findings) {
                     sections.push(section("Differences between groups", matrix));
                 }

@@ -30,36 +30,49 @@ pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
         let ends = data.and_then(|data| data.intervals()).map(|both| both.get(moment));
         (data.and_then(|data| data.moments.get(moment)), ends)
     };
+    let pooled_rows = |name: &str| -> Vec<ForestRow> {
+        let of = |finding: &Finding<'_>| {
+            let found = finding.pooled.and_then(|pooled| pooled.get(name));
+            found.map_or((None, None), |found| (found.pooled.value, found.pooled.ends()))
+        };
+        shown.iter().map(of).collect()
+    };
     let left_out = findings.len() - shown.len();
-    let all: [(&str, &str, &str, Vec<ForestRow>); 4] = [
+    let all: [(&str, &str, &str, Vec<ForestRow>, Vec<ForestRow>); 4] = [
         (
             "groups-bulk-velocity",
             "√(c₁₁₁₁/ρ) of each group",
             "√(c₁₁₁₁/ρ) (m/s)",
             shown.iter().map(|one| identified_row(one, false)).collect(),
+            pooled_rows("bulk_velocity"),
         ),
         (
             "groups-dispersion",
             "Dispersion of each group",
             "dispersion δ",
             shown.iter().map(|one| identified_row(one, true)).collect(),
+            pooled_rows("dispersion"),
         ),
         (
             "groups-mean",
             "Mean of each group's measured velocities",
             "mean (m/s)",
             shown.iter().map(|one| measured_row(one, false)).collect(),
+            Vec::new(),
         ),
         (
             "groups-variation",
             "Coefficient of variation of each group's measured velocities",
             "coefficient of variation",
             shown.iter().map(|one| measured_row(one, true)).collect(),
+            Vec::new(),
         ),
     ];
     let figures = all.into_iter();
     figures
-        .map(|(name, title, label, places)| figure(shown, left_out, [name, title, label], &places))
+        .map(|(name, title, label, own, pooled)| {
+            figure(shown, left_out, [name, title, label], [&own, &pooled])
+        })
         .collect()
 }
 
@@ -70,7 +83,7 @@ fn figure(
     findings: &[Finding<'_>],
     left_out: usize,
     [name, title, label]: [&str; 3],
-    places: &[ForestRow],
+    [places, pooled]: [&[ForestRow]; 2],
 ) -> Figure {
     let names = findings.iter().map(|one| one.group.unwrap_or_default().to_owned()).collect();
     let y = Axis::with_categories("", names);
@@ -94,6 +107,20 @@ fn figure(
         chart.layer("no interval known", Ink::Second, Shape::Points(without));
         reading.push_str(
             " Without an interval nothing is known of how far a value may be off: the data are too few, leave directions open, or are missed by the model.",
+        );
+    }
+    // Below their own ones.
+    let pooled_rows = || pooled.iter().enumerate().map(|(row, place)| (row as f64 + 0.3, place));
+    let intervals: Vec<_> = pooled_rows()
+        .filter_map(|(row, (_, ends))| ends.map(|[low, high]| [low, high, row]))
+        .collect();
+    if !intervals.is_empty() {
+        chart.height *= 1.5;
+        chart.layer("with the help of all groups", Ink::Third, Shape::Intervals(intervals));
+        let points = pooled_rows().filter_map(|(row, (value, _))| Some([(*value)?, row]));
+        chart.layer("pooled value", Ink::Third, Shape::Points(points.collect()));
+        reading.push_str(
+            " Below it is what follows with the help of all groups, which share a mean and a scatter: a group of few velocities is drawn towards the others.",
         );
     }
     if left_out > 0 {
