@@ -64,6 +64,9 @@ pub struct Probe {
     /// Frequency, Hz, at which guided waves are measured; `None`: the centre frequency. It changes nothing
     /// else.
     pub guided_wave_frequency: Option<f64>,
+    /// Whether A0 is that of the bone between coupling and marrow as half-spaces, and not in a vacuum. It changes
+    /// nothing else.
+    pub a0_in_fluids: bool,
     /// Width along the probe, m, of the source's and of each receiver's element: the source emits evenly
     /// over it, and a receiver averages over it. 0: lines. Below the pitch and the nearest distance.
     pub element_width: f64,
@@ -161,6 +164,7 @@ impl Default for Probe {
             amplitude: 100.0,
             pulse: PulseForm::default(),
             guided_wave_frequency: None,
+            a0_in_fluids: false,
             element_width: 0.0,
             source: Source { x1: 0.0, x3: 2e-3 },
             receivers: Receivers { first_x1: 11e-3, pitch: 0.8e-3, count: 14, x3: 2e-3 },
@@ -190,6 +194,9 @@ impl Section for Probe {
             &mut self.guided_wave_frequency,
             Number::above_zero(&FREQUENCY),
         );
+        let in_fluids = "whether A0 is that of the bone between coupling and marrow, which reach far, \
+                         instead of a vacuum; only where it is slower than sound in both";
+        fields.boolean(Key { name: "a0_in_fluids", meaning: in_fluids }, &mut self.a0_in_fluids);
         let width = "width of the source and of each receiver along the probe, over which they emit and \
                      average; below the pitch and the nearest distance. 0: lines";
         fields.number(

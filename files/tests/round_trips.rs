@@ -89,6 +89,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                     amplitude: pulse.1,
                     pulse: pulse.2,
                     guided_wave_frequency: bidirectional.then_some(0.2 * pulse.0),
+                    a0_in_fluids: bidirectional,
                     element_width,
                     source: Source { x1, x3 },
                     receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },

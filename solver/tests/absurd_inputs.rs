@@ -85,6 +85,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                 amplitude: 100.0,
                 pulse,
                 guided_wave_frequency,
+                a0_in_fluids: guided_wave_frequency.is_some(),
                 element_width: width * row.0.min(row.1),
                 source: Source { x1: 0.0, x3: heights.0 * coupling.thickness },
                 receivers: Receivers {

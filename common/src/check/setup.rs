@@ -34,6 +34,7 @@ pub fn setup(setup: &Setup, violations: &mut Violations) {
     one_side(&setup.probe, violations);
     element_width(setup, violations);
     tilted(setup, violations);
+    a0_in_fluids(setup, violations);
     method(setup, violations);
     sampling(setup, violations);
 }
@@ -143,6 +144,22 @@ fn element_width(setup: &Setup, violations: &mut Violations) {
                 probe.element_width
             ),
         );
+    }
+}
+
+/// Checks that A0 between fluids is that of half-spaces.
+fn a0_in_fluids(setup: &Setup, violations: &mut Violations) {
+    let layers = &setup.layers;
+    let fluids = [("coupling", layers.coupling_fluids()), ("marrow", layers.marrow_fluids())];
+    for (name, fluids) in fluids {
+        let count = fluids.as_slice().len();
+        if setup.probe.a0_in_fluids && count > 1 {
+            let message = format!(
+                "is true, and layers.{name} has {count} fluids; between half-spaces of one fluid each A0 is \
+                 known: leave out layers.{name}.sublayers, or set it to false"
+            );
+            violations.add("probe.a0_in_fluids", message);
+        }
     }
 }
 

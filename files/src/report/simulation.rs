@@ -92,7 +92,8 @@ pub struct FirstSignalReport {
     pub center_frequency: Option<f64>,
 }
 
-/// The fundamental guided waves of the bone as a plate in a vacuum, without its attenuation.
+/// The fundamental guided waves of the bone as a plate in a vacuum, without its attenuation; A0 with
+/// `probe.a0_in_fluids` of the bone between its fluids.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GuidedWavesReport {
     /// The frequency at which they are computed, Hz: `probe.guided_wave_frequency`.

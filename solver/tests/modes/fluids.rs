@@ -155,3 +155,38 @@ fn only_single_fluids_are_half_spaces() {
     let refused = Solver::new(&setup).modes_in_fluids(&optimum(), 0.7e6);
     assert_eq!(refused, Err(ModesError::SeveralFluids { field: "layers.marrow.sublayers" }));
 }
+
+/// A0 of a setup with `a0_in_fluids` is the wave that is followed from the vacuum into the fluids.
+#[test]
+fn a0_between_fluids_is_the_wave_that_is_followed_into_them() {
+    let check = |bone: BoneRef<'_>, thickness: f64, frequency: f64| {
+        let mut setup = setup(thickness, [1000.0, 930.0], None);
+        (setup.probe.guided_wave_frequency, setup.probe.a0_in_fluids) = (Some(frequency), true);
+        let found = Solver::new(&setup).guided_waves(bone).a0.unwrap();
+        let modes = fluid_modes(&setup, bone, frequency).modes;
+        let followed = modes.iter().find(|mode| mode.name.as_deref() == Some("A0")).unwrap();
+        let pairs = [
+            (found.phase_velocity, followed.phase_velocity, 1e-9),
+            (found.group_velocity, followed.group_velocity, 1e-4),
+        ];
+        for (found, expected, tolerance) in pairs {
+            assert!((found / expected - 1.0).abs() < tolerance, "{found}, {expected}: {frequency}");
+        }
+    };
+    for frequency in [0.05e6, 0.15e6] {
+        for bone in [optimum(), isotropic(16e9, 0.3), draw(0.2, 1), draw(0.4, 2)] {
+            check((&bone).into(), 1.5e-3, frequency);
+        }
+        let layered = stack(&[(0.4e-3, optimum()), (0.9e-3, draw(0.2, 3)), (0.3e-3, draw(0.2, 4))]);
+        check((&layered).into(), 1.6e-3, frequency);
+    }
+}
+
+#[test]
+fn an_a0_that_radiates_is_not_stated() {
+    let mut setup = setup(4e-3, [1000.0, 930.0], None);
+    setup.probe.a0_in_fluids = true;
+    let waves = Solver::new(&setup).guided_waves(&optimum());
+    assert!(waves.a0.is_none() && waves.a0_radiates && waves.s0.is_some(), "{waves:?}");
+    assert!(waves.reason().unwrap().contains("lower probe.guided_wave_frequency"), "{waves:?}");
+}

@@ -28,6 +28,7 @@ const GUIDED_WAVES: GuidedWaves = GuidedWaves {
     frequency: 1e6,
     a0: Some(GuidedWave { phase_velocity: 1601.25, group_velocity: 1650.5 }),
     s0: Some(GuidedWave { phase_velocity: 1610.75, group_velocity: 1598.125 }),
+    a0_radiates: false,
 };
 
 /// A setup with three receivers. The exact method's sampling changes with every improvement of it;

@@ -80,11 +80,13 @@ fn first_signal(signal: &FirstSignal) -> String {
 /// Returns the velocities of the guided waves.
 fn guided_waves(simulation: &ShownSimulation<'_>) -> String {
     let waves = &simulation.solved.guided_waves;
-    let is_attenuated = simulation.solved.setup.layers.bone_attenuation.quality_factor.is_some();
+    let setup = &simulation.solved.setup;
+    let is_attenuated = setup.layers.bone_attenuation.quality_factor.is_some();
     let without = if is_attenuated { ", without its attenuation" } else { "" };
+    let but = if setup.probe.a0_in_fluids { " (A0: between its fluids)" } else { "" };
     let frequency = significant(waves.frequency * 1e-6, DIGITS);
     let mut text =
-        wrapped(&format!("guided waves of the bone in a vacuum{without}, at {frequency} MHz"));
+        wrapped(&format!("guided waves of the bone in a vacuum{but}{without}, at {frequency} MHz"));
     let row = |name: &str, wave: Option<GuidedWave>| {
         let wave = wave?;
         let [phase, group] = [wave.phase_velocity, wave.group_velocity]

@@ -218,6 +218,7 @@ fn layered() -> impl Strategy<Value = Setup> {
         (setup.probe.tilt, setup.probe.bidirectional) = (-0.02 * refinement, quality.is_some());
         setup.probe.element_width = 1e-4 * refinement;
         setup.probe.guided_wave_frequency = quality.map(|quality| 1e4 * quality);
+        setup.probe.a0_in_fluids = quality.is_some();
         setup.probe.pulse = match quality {
             Some(_) => PulseForm::Tone { cycles: 4.0 * refinement },
             None if refinement < 1.0 => PulseForm::Ricker,

@@ -61,6 +61,11 @@ impl Symmetry {
         }
     }
 
+    /// Returns those of the bone between two fluids that differ.
+    pub(super) fn between_fluids(self) -> Self {
+        Self { plate: false, cross: false, ..self }
+    }
+
     /// Returns whether waves differ by their behaviour in the middle plane, so that half of the bone has
     /// them all.
     pub(super) fn halves(self) -> bool {

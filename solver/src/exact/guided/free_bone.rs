@@ -1,4 +1,6 @@
-//! A bone with free faces, whose waves are counted.
+//! A bone whose waves are counted: with free faces, or between fluids.
+
+use osteon_common::fluid_sublayers::FluidSublayer;
 
 use super::count::CountWaves;
 use super::family::{Family, Symmetry};
@@ -59,6 +61,15 @@ impl FreeBone {
         };
         let thickness = media.iter().fold(0.0, |sum, layer| sum + layer.thickness);
         Self { counter, fastest: media.fastest(), thickness }
+    }
+
+    /// Creates a bone between fluids, which reach far.
+    pub(super) fn between(isa: Isa, media: &Media, fluids: [FluidSublayer; 2]) -> Self {
+        let slowest = fluids[0].sound_speed.min(fluids[1].sound_speed);
+        let thickness = media.iter().fold(0.0, |sum, layer| sum + layer.thickness);
+        let counter = WaveCounter::Stack(FreeStack::between(isa, media, fluids));
+        // Faster waves radiate, and have no real wavenumbers.
+        Self { counter, fastest: slowest.min(media.fastest()), thickness }
     }
 
     /// Returns the wave of this rank in a family at `omega`, rad/s: the first wavenumber at which its

@@ -1,9 +1,12 @@
-//! Counts the guided waves of a bone of sublayers whose frequency is below a given one.
+//! Counts the guided waves of a bone of sublayers whose frequency is below a given one; of one between fluids,
+//! those that are slower than sound in both.
 //!
 //! Counting goes from the lowest face upwards: eliminating a face from the stiffness of a sublayer on what
 //! lies below adds its negative eigenvalues to the count, and leaves the stiffness of the sublayer's upper
 //! face. A stack is in general not its own image in a point, so its stiffness is Hermitian and not real. It
 //! is taken as the real matrix of twice the size, which has each eigenvalue twice.
+
+use osteon_common::fluid_sublayers::FluidSublayer;
 
 use super::count::{Real, first_lane, joint_matrix, negative_pivots, symmetric_entry};
 use super::family::Family;
@@ -26,9 +29,16 @@ pub(super) struct FreeStack {
     /// Media and plates, upwards.
     plates: Vec<(Medium, AccuratePlate)>,
     is_half: bool,
+    /// The fluids above and below, if there are any.
+    fluids: Option<[FluidSublayer; 2]>,
 }
 
 impl FreeStack {
+    /// Creates the stack of these media between fluids, which reach far.
+    pub(super) fn between(isa: Isa, media: &Media, fluids: [FluidSublayer; 2]) -> Self {
+        Self { fluids: Some(fluids), ..Self::new(isa, media, false) }
+    }
+
     /// Creates the stack of these media; with `is_half` its upper half, which ends in the middle of a medium.
     pub(super) fn new(isa: Isa, media: &Media, is_half: bool) -> Self {
         let count = 1 + media.lower.len();
@@ -43,15 +53,19 @@ impl FreeStack {
         let kept = middle.map_or(count, |middle| middle + 1);
         let mut plates: Vec<_> = media.iter().enumerate().take(kept).map(plate).collect();
         plates.reverse();
-        Self { isa, plates, is_half }
+        Self { isa, plates, is_half, fluids: None }
     }
 
     /// Returns the number of waves of a family whose frequency at `k` (rad/m) is below `omega` (rad/s);
     /// `None` if a number is not finite.
     pub(super) fn count(&mut self, family: &Family, k: f64, omega: f64) -> Option<u64> {
-        let Self { isa, plates, is_half } = self;
+        let Self { isa, plates, is_half, fluids } = self;
+        let loads = fluids.map(|fluids| fluids.map(|fluid| load(&fluid, k, omega)));
         let mut all = 0_u64;
         let mut below = [[0.0; FACE]; FACE];
+        if let Some([_, lower]) = loads {
+            add_load(&mut below, lower);
+        }
         // In the middle plane some displacements of a family are zero.
         let mut free = if *is_half { &family.middle } else { &family.components };
         let upper: [usize; FACE] = std::array::from_fn(|i| FACE + i);
@@ -73,8 +87,25 @@ impl FreeStack {
             }
             free = components;
         }
+        if let Some([upper, _]) = loads {
+            add_load(&mut below, upper);
+        }
         all.checked_add(negative_pivots(&mut below, &both_parts(free), &[])? / 2)
     }
+}
+
+/// Returns the stiffness of a fluid half-space against displacements across its face, Pa/m, for waves that are
+/// slower than sound in it: that of a mass, and infinite at the speed of sound. It has no waves of its own where
+/// its face is at rest.
+fn load(fluid: &FluidSublayer, k: f64, omega: f64) -> f64 {
+    let over_c = omega / fluid.sound_speed;
+    -fluid.density * omega * omega / (k * k - over_c * over_c).sqrt()
+}
+
+/// Adds a stiffness against displacements along x3 to that of a face.
+fn add_load(face: &mut Real<FACE>, load: f64) {
+    face[2][2] += load;
+    face[5][5] += load;
 }
 
 /// Returns the rows of real and imaginary parts of these components.
