@@ -275,6 +275,7 @@ const CI: &[&[&str]] = &[
     &["test", "umbridge"],
     &["test", "deploy"],
     &["test", "slurm", slurm::IF_INSTALLED],
+    release::TRIAL,
 ];
 
 fn main() -> ExitCode {

@@ -7,6 +7,9 @@ use crate::places::programs;
 use crate::process::cargo;
 use crate::python::{WHEELS, python};
 
+/// What CI makes: the files for one processor, built quickly.
+pub(crate) const TRIAL: &[&str] = &["release", "x86_64", "--profile", "dev", "--dirty"];
+
 /// Makes all files of a release, or those for the processors that `words` name, and tries them. Uses
 /// `python3`, or the interpreter named by the variable `PYTHON`.
 pub(crate) fn make(words: &[String]) -> Result<()> {
