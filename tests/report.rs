@@ -91,8 +91,8 @@ fn pooled_groups_have_a_table_and_a_figure_of_both_values() {
     };
     let groups: String = (0..4).map(group).collect();
     let job = format!(
-        "[data.groups]\n{groups}[groups]\npooled = true\n[parameters]\nlongitudinal_young_modulus = \
-         {{ bounds = [12e9, 25e9] }}\ndispersion = {{ start = 0.05, bounds = [0.005, 0.3] }}\n[monte_carlo]\n\
+        "[data.groups]\n{groups}[groups]\npooled = true\n[parameters]\nmaterial = \
+         \"human-tibia-rho-1996\"\nlongitudinal_young_modulus = {{ bounds = [12e9, 25e9] }}\ndispersion = {{ start = 0.05, bounds = [0.005, 0.3] }}\n[monte_carlo]\n\
          realizations = 64\nsampling = \"sobol\"\n[search]\nmethod = \"newton\"\n"
     );
     let (file, out) = (scratch.write("job.toml", &job), scratch.path("out"));

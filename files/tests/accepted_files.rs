@@ -280,16 +280,14 @@ fn a_complete_job_means_what_it_says() {
         given.range(Parameter::TransversePoissonRatio),
         Range::Free { start: 0.4, lower: 0.2, upper: 0.5 }
     );
-    assert_eq!(given.monte_carlo.realizations, 500);
-    assert_eq!(given.monte_carlo.seed, 7);
-    assert_eq!(given.monte_carlo.sampling, Sampling::Sobol);
-    assert_eq!(given.monte_carlo.scrambles, 4);
+    let monte_carlo = &given.monte_carlo;
+    assert_eq!((monte_carlo.realizations, monte_carlo.seed), (500, 7));
+    assert_eq!((monte_carlo.sampling, monte_carlo.scrambles), (Sampling::Sobol, 4));
     assert!(given.monte_carlo.control_variate);
     assert_eq!(given.monte_carlo.max_failed_fraction, 0.02);
-    assert_eq!(given.search.max_evaluations, 300);
-    assert_eq!(given.search.cost_tolerance, 1e-9);
-    assert_eq!(given.search.size_tolerance, 1e-4);
-    assert_eq!(given.search.initial_step, 0.1);
+    let search = &given.search;
+    assert_eq!((search.max_evaluations, search.cost_tolerance), (300, 1e-9));
+    assert_eq!((search.size_tolerance, search.initial_step), (1e-4, 0.1));
     assert!(!given.search.sensitivities);
 }
 

@@ -1,15 +1,15 @@
 //! Charts: what is drawn, as numbers. [`Chart::svg`] draws it, and [`Chart::csv`] writes the numbers.
 
 mod draw;
-mod file_style;
 mod frame;
 mod raster;
 mod scale;
+mod style;
 
 use std::fmt::Write as _;
 
-pub(crate) use self::draw::STYLE;
 pub(crate) use self::scale::{AxisScale, Spacing};
+pub(crate) use self::style::STYLE;
 
 /// A chart with its texts.
 #[derive(Debug, Clone, PartialEq)]

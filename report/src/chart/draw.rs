@@ -3,15 +3,12 @@
 
 use std::fmt::Write as _;
 
-use super::file_style::file_style;
 use super::frame::{Frame, coordinate};
 use super::raster::{cells, colour_bar, key_width};
 use super::scale::Tick;
+use super::style::file_style;
 use super::{Axis, AxisScale, Chart, ChartLayer, Ink, Shape};
 use crate::text::{escape, shorten};
-
-/// Colours and strokes of the charts of a page.
-pub(crate) const STYLE: &str = include_str!("chart.css");
 
 /// Width of a chart.
 const WIDTH: f64 = 480.0;
@@ -27,7 +24,7 @@ const LINE: f64 = 17.0;
 const CATEGORY_CHARACTERS: usize = 26;
 
 impl Chart {
-    /// Returns the chart as an element of a page; its colours come from [`STYLE`].
+    /// Returns the chart as an element of a page; its colours come from [`STYLE`](super::style::STYLE).
     pub(crate) fn svg(&self) -> String {
         self.draw("")
     }

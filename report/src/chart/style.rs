@@ -1,9 +1,10 @@
-//! The style of a chart that is a file of its own.
+//! Colours and strokes of charts.
 //!
 //! Programs that are no browsers, such as those that draw figures for papers, know no variables in styles, and
-//! then everything is black. So a file has the colours of a light page themselves.
+//! then everything is black. So a chart that is a file of its own has the colours of a light page themselves.
 
-use super::draw::STYLE;
+/// Colours and strokes of the charts of a page.
+pub(crate) const STYLE: &str = include_str!("chart.css");
 
 /// What stands for the colour of an element's class.
 const CLASS_COLOUR: &str = "var(--c)";
