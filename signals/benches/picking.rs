@@ -5,7 +5,6 @@
 //! --benches`, it is a short run.
 
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on should say where")]
-#![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 #![expect(clippy::print_stdout, reason = "the table goes to stdout")]
 
 use std::hint::black_box;

@@ -7,6 +7,16 @@ use crate::finding::Finding;
 /// Most groups that are drawn.
 pub(crate) const GROUPS_MAX: usize = 60;
 
+/// How to read what a group has by itself.
+const OWN: &str = "Each row is a group: its value and its 95 % interval. Intervals that do not overlap are \
+                   different; two that overlap a little may be, too, which the table of differences decides.";
+/// How to read a value without an interval.
+const WITHOUT: &str = " Without an interval nothing is known of how far a value may be off: the data are too \
+                       few, leave directions open, or are missed by the model.";
+/// How to read what follows with the help of the others.
+const POOLED: &str = " Below it is what follows with the help of all groups, which share a mean and a scatter: a \
+                      group of few velocities is drawn towards the others.";
+
 /// Returns the figures that compare the groups: what was identified, and what was measured.
 pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
     let shown = &findings[..findings.len().min(GROUPS_MAX)];
@@ -38,94 +48,94 @@ pub(crate) fn forest(findings: &[Finding<'_>]) -> Vec<Figure> {
         shown.iter().map(of).collect()
     };
     let left_out = findings.len() - shown.len();
-    let all: [(&str, &str, &str, Vec<ForestRow>, Vec<ForestRow>); 4] = [
-        (
-            "groups-bulk-velocity",
-            "√(c₁₁₁₁/ρ) of each group",
-            "√(c₁₁₁₁/ρ) (m/s)",
-            shown.iter().map(|one| identified_row(one, false)).collect(),
-            pooled_rows("bulk_velocity"),
-        ),
-        (
-            "groups-dispersion",
-            "Dispersion of each group",
-            "dispersion δ",
-            shown.iter().map(|one| identified_row(one, true)).collect(),
-            pooled_rows("dispersion"),
-        ),
-        (
-            "groups-mean",
-            "Mean of each group's measured velocities",
-            "mean (m/s)",
-            shown.iter().map(|one| measured_row(one, false)).collect(),
-            Vec::new(),
-        ),
-        (
-            "groups-variation",
-            "Coefficient of variation of each group's measured velocities",
-            "coefficient of variation",
-            shown.iter().map(|one| measured_row(one, true)).collect(),
-            Vec::new(),
-        ),
+    let identified = |dispersion| shown.iter().map(|one| identified_row(one, dispersion)).collect();
+    let measured = |variation| shown.iter().map(|one| measured_row(one, variation)).collect();
+    let all = [
+        ForestPlot {
+            name: "groups-bulk-velocity",
+            title: "√(c₁₁₁₁/ρ) of each group",
+            label: "√(c₁₁₁₁/ρ) (m/s)",
+            own: identified(false),
+            pooled: pooled_rows("bulk_velocity"),
+        },
+        ForestPlot {
+            name: "groups-dispersion",
+            title: "Dispersion of each group",
+            label: "dispersion δ",
+            own: identified(true),
+            pooled: pooled_rows("dispersion"),
+        },
+        ForestPlot {
+            name: "groups-mean",
+            title: "Mean of each group's measured velocities",
+            label: "mean (m/s)",
+            own: measured(false),
+            pooled: Vec::new(),
+        },
+        ForestPlot {
+            name: "groups-variation",
+            title: "Coefficient of variation of each group's measured velocities",
+            label: "coefficient of variation",
+            own: measured(true),
+            pooled: Vec::new(),
+        },
     ];
-    let figures = all.into_iter();
-    figures
-        .map(|(name, title, label, own, pooled)| {
-            figure(shown, left_out, [name, title, label], [&own, &pooled])
-        })
-        .collect()
+    all.iter().map(|plot| plot.figure(shown, left_out)).collect()
 }
 
 /// A value and its interval.
 type ForestRow = (Option<f64>, Option<[f64; 2]>);
 
-fn figure(
-    findings: &[Finding<'_>],
-    left_out: usize,
-    [name, title, label]: [&str; 3],
-    [places, pooled]: [&[ForestRow]; 2],
-) -> Figure {
-    let names = findings.iter().map(|one| one.group.unwrap_or_default().to_owned()).collect();
-    let y = Axis::with_categories("", names);
-    let mut chart = Chart::new(name, title, Axis::linear(label), y);
-    chart.height = (0.1 * places.len() as f64).max(0.35);
-    let rows = || places.iter().enumerate();
-    let intervals =
-        rows().filter_map(|(row, (_, ends))| ends.map(|[low, high]| [low, high, row as f64]));
-    chart.layer("95 % interval", Ink::First, Shape::Intervals(intervals.collect()));
-    let points_with = |interval: bool| {
-        let of = rows().filter(move |(_, (_, ends))| ends.is_some() == interval);
-        of.filter_map(|(row, (value, _))| Some([(*value)?, row as f64])).collect::<Vec<_>>()
-    };
-    chart.layer("value", Ink::First, Shape::Points(points_with(true)));
-    let without = points_with(false);
-    let mut reading = "Each row is a group: its value and its 95 % interval. Intervals that do not \
-                       overlap are different; two that overlap a little may be, too, which the table \
-                       of differences decides."
-        .to_owned();
-    if !without.is_empty() {
-        chart.layer("no interval known", Ink::Second, Shape::Points(without));
-        reading.push_str(
-            " Without an interval nothing is known of how far a value may be off: the data are too few, leave directions open, or are missed by the model.",
-        );
+/// A figure with a row for each group.
+struct ForestPlot {
+    name: &'static str,
+    title: &'static str,
+    label: &'static str,
+    /// What each group has by itself.
+    own: Vec<ForestRow>,
+    /// What it has with the help of the others; empty where nothing is pooled.
+    pooled: Vec<ForestRow>,
+}
+
+impl ForestPlot {
+    fn figure(&self, findings: &[Finding<'_>], left_out: usize) -> Figure {
+        let Self { name, title, label, own, pooled } = self;
+        let names = findings.iter().map(|one| one.group.unwrap_or_default().to_owned()).collect();
+        let y = Axis::with_categories("", names);
+        let mut chart = Chart::new(*name, *title, Axis::linear(*label), y);
+        chart.height = (0.1 * own.len() as f64).max(0.35);
+        let rows = || own.iter().enumerate();
+        let intervals =
+            rows().filter_map(|(row, (_, ends))| ends.map(|[low, high]| [low, high, row as f64]));
+        chart.layer("95 % interval", Ink::First, Shape::Intervals(intervals.collect()));
+        let points_with = |interval: bool| {
+            let of = rows().filter(move |(_, (_, ends))| ends.is_some() == interval);
+            of.filter_map(|(row, (value, _))| Some([(*value)?, row as f64])).collect::<Vec<_>>()
+        };
+        chart.layer("value", Ink::First, Shape::Points(points_with(true)));
+        let without = points_with(false);
+        let mut reading = OWN.to_owned();
+        if !without.is_empty() {
+            chart.layer("no interval known", Ink::Second, Shape::Points(without));
+            reading.push_str(WITHOUT);
+        }
+        // Below their own ones.
+        let pooled_rows =
+            || pooled.iter().enumerate().map(|(row, place)| (row as f64 + 0.3, place));
+        let intervals: Vec<_> = pooled_rows()
+            .filter_map(|(row, (_, ends))| ends.map(|[low, high]| [low, high, row]))
+            .collect();
+        if !intervals.is_empty() {
+            chart.height *= 1.5;
+            chart.layer("with the help of all groups", Ink::Third, Shape::Intervals(intervals));
+            let points = pooled_rows().filter_map(|(row, (value, _))| Some([(*value)?, row]));
+            chart.layer("pooled value", Ink::Third, Shape::Points(points.collect()));
+            reading.push_str(POOLED);
+        }
+        if left_out > 0 {
+            reading.push_str(&format!(" The last {left_out} groups are not drawn."));
+        }
+        chart.description = format!("{} groups.", own.len());
+        Figure { chart, reading }
     }
-    // Below their own ones.
-    let pooled_rows = || pooled.iter().enumerate().map(|(row, place)| (row as f64 + 0.3, place));
-    let intervals: Vec<_> = pooled_rows()
-        .filter_map(|(row, (_, ends))| ends.map(|[low, high]| [low, high, row]))
-        .collect();
-    if !intervals.is_empty() {
-        chart.height *= 1.5;
-        chart.layer("with the help of all groups", Ink::Third, Shape::Intervals(intervals));
-        let points = pooled_rows().filter_map(|(row, (value, _))| Some([(*value)?, row]));
-        chart.layer("pooled value", Ink::Third, Shape::Points(points.collect()));
-        reading.push_str(
-            " Below it is what follows with the help of all groups, which share a mean and a scatter: a group of few velocities is drawn towards the others.",
-        );
-    }
-    if left_out > 0 {
-        reading.push_str(&format!(" The last {left_out} groups are not drawn."));
-    }
-    chart.description = format!("{} groups.", places.len());
-    Figure { chart, reading }
 }
