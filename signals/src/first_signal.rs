@@ -3,7 +3,7 @@
 //! The definitions are the model's (`osteon_solver::first_signal`).
 
 use osteon_common::array_decay::{decay, decay_error};
-use osteon_common::line_fit::mean;
+use osteon_common::line_fit::{mean, slope};
 
 use crate::receiver_pick::{MeasuredValue, ReceiverPick};
 
@@ -28,6 +28,12 @@ pub(crate) fn decay_of(distances: &[f64], receivers: &[ReceiverPick]) -> Option<
         amplitudes.push(amplitude.value);
         errors.push(amplitude.standard_error / amplitude.value);
     }
+    if errors.contains(&0.0) {
+        // The noise is unknown; the scatter about the line is not.
+        let logarithms: Vec<f64> =
+            amplitudes.iter().map(|amplitude| libm::log(*amplitude)).collect();
+        errors = vec![scatter_about_line(&places, &logarithms); places.len()];
+    }
     let (value, standard_error) = (decay(&places, &amplitudes), decay_error(&places, &errors));
     value.is_finite().then_some(MeasuredValue { value, standard_error })
 }
@@ -37,19 +43,38 @@ pub(crate) fn frequency_of(
     picked: &[ReceiverPick],
     other: &[ReceiverPick],
 ) -> Option<MeasuredValue> {
-    let both = picked
-        .iter()
-        .zip(other)
-        .filter(|(one, other)| one.failure.is_none() && other.failure.is_none());
-    let (mut delays, mut variance) = (Vec::new(), 0.0);
-    for (one, other) in both {
+    let is_used = |(one, other): &(&ReceiverPick, &ReceiverPick)| {
+        one.failure.is_none() && other.failure.is_none()
+    };
+    let (mut delays, mut variance, mut is_noise_known) = (Vec::new(), 0.0, true);
+    for (one, other) in picked.iter().zip(other).filter(is_used) {
         delays.push(other.time? - one.time?);
-        variance +=
-            one.standard_error * one.standard_error + other.standard_error * other.standard_error;
+        let errors = [one.standard_error, other.standard_error];
+        is_noise_known &= !errors.contains(&0.0);
+        variance += errors.iter().map(|error| error * error).sum::<f64>();
     }
+    let count = delays.len() as f64;
     let half_period = mean(&delays).abs();
-    let error = variance.sqrt() / delays.len() as f64;
+    let error = match is_noise_known {
+        true => variance.sqrt() / count,
+        false => scatter(&delays) / count.sqrt(),
+    };
     let value = 0.5 / half_period;
     (half_period > 0.0)
         .then(|| MeasuredValue { value, standard_error: value * error / half_period })
+}
+
+/// Returns the standard deviation of values about their line over places.
+fn scatter_about_line(places: &[f64], values: &[f64]) -> f64 {
+    let (slope, middle, centre) = (slope(values, places), mean(values), mean(places));
+    let off = values.iter().zip(places).map(|(value, x)| value - middle - slope * (x - centre));
+    let squares: f64 = off.map(|off| off * off).sum();
+    (squares / (values.len() as f64 - 2.0).max(1.0)).sqrt()
+}
+
+/// Returns the standard deviation of values.
+fn scatter(values: &[f64]) -> f64 {
+    let middle = mean(values);
+    let squares: f64 = values.iter().map(|value| (value - middle) * (value - middle)).sum();
+    (squares / (values.len() as f64 - 1.0).max(1.0)).sqrt()
 }

@@ -9,7 +9,8 @@ pub struct ReceiverPick {
     pub time: Option<f64>,
     /// Standard error of the time from the signal's noise, s; 0 if the noise is unknown.
     pub standard_error: f64,
-    /// Size of the extremum, in the unit of the signals, if there is one.
+    /// Size of the extremum, in the unit of the signals, if there is one; its standard error is 0 if the noise is
+    /// unknown.
     pub amplitude: Option<MeasuredValue>,
     /// Why the time is not used.
     pub failure: Option<PickFailure>,
@@ -20,6 +21,6 @@ pub struct ReceiverPick {
 pub struct MeasuredValue {
     /// The number.
     pub value: f64,
-    /// Its standard error from the noise of the signals.
+    /// Its standard error.
     pub standard_error: f64,
 }

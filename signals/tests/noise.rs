@@ -104,6 +104,26 @@ fn what_else_the_first_signal_tells_is_the_models() {
     }
 }
 
+/// A record that begins with the arrivals tells no noise, but receivers that differ.
+#[test]
+fn without_a_quiet_beginning_scatter_makes_the_errors() {
+    let mut series = with_noise(&CLEAN, 1e-4 * packet_peak(&CLEAN), 3);
+    for array in &mut series.directions {
+        let dropped = (4e-6 / array.step) as usize;
+        array.start += dropped as f64 * array.step;
+        array.receivers.iter_mut().for_each(|samples| drop(samples.drain(..dropped)));
+    }
+    let found = pick(&description(None), &series);
+    assert!(found.estimate.is_ok(), "{:?}", found.estimate);
+    assert!(found.receivers.iter().any(|receiver| receiver.standard_error == 0.0));
+    for found in others(&description(None), &series) {
+        assert!(
+            found.standard_error > 0.0 && found.standard_error < 0.1 * found.value,
+            "{found:?}"
+        );
+    }
+}
+
 #[test]
 fn intervals_of_the_others_hold() {
     let probe = description(Some([0.0, 2.5e6]));

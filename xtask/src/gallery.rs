@@ -36,7 +36,7 @@ const EXHIBITS: &[Exhibit] = &[
         title: "One bone",
         words: &["simulate", "examples/cases/A.toml"],
         figure: "traces",
-        text: "The pressure at each receiver, with the extremum from whose times the velocity follows, and the \
+        text: "The pressure at each receiver, with the extremum from whose times the velocity follows, and the\n\
                threshold above which a packet begins.",
     },
     Exhibit {
@@ -52,7 +52,7 @@ const EXHIBITS: &[Exhibit] = &[
         title: "A porosity",
         words: &["identify", "examples/porosity.toml"],
         figure: "density",
-        text: "Two moments of measured velocities determine two numbers, a porosity and the dispersion of the \
+        text: "Two moments of measured velocities determine two numbers, a porosity and the dispersion of the\n\
                elasticity. This is what `osteon demo` runs.",
     },
     Exhibit {

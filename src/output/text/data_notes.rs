@@ -155,10 +155,7 @@ mod tests {
         };
         assert_eq!(of(0.02, 0.5), None);
         let one = of(0.004, 0.5).unwrap();
-        assert!(
-            one.starts_with("The velocities reach farther down (L-skewness -0.20, of"),
-            "{one}"
-        );
+        assert!(one.starts_with("The velocities reach farther down (L-skewness"), "{one}");
         let both = of(0.004, 0.002).unwrap();
         assert!(both.contains("and have heavier tails (L-kurtosis"), "{both}");
     }
