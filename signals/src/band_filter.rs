@@ -17,7 +17,7 @@ const LOWER_EDGE: f64 = 1.0 / 3.0;
 const REACH: f64 = 4.5;
 /// Samples, in a period of the upper frequency, that are enough of a filtered signal. Interpolation would need a
 /// quarter, but also feels what is some ten samples away, such as the arrival in the noise before it.
-const SAMPLES_PER_PERIOD: f64 = 16.0;
+const SAMPLES_PER_PERIOD: f64 = 12.0;
 
 /// A filter for signals of one sampling interval.
 #[derive(Debug, Clone)]
@@ -121,7 +121,7 @@ mod tests {
         let samples: Vec<f64> = (0..500).map(|j| libm::cos(0.01 * f64::from(j * j % 97))).collect();
         let filter = BandFilter::new(0.0, 0.012, 1.0);
         let all = BandFilter { stride: 1, ..filter.clone() }.apply(&samples);
-        assert_eq!(filter.stride(), 5);
-        assert_eq!(filter.apply(&samples), all.into_iter().step_by(5).collect::<Vec<_>>());
+        assert_eq!(filter.stride(), 6);
+        assert_eq!(filter.apply(&samples), all.into_iter().step_by(6).collect::<Vec<_>>());
     }
 }

@@ -72,7 +72,7 @@ fn at_20_decibels_intervals_hold() {
     check(&CLEAN, 20.0, 8.0, 40);
 }
 
-/// Of signals that are sampled this finely the filter keeps every sixth value. Their noise has the same size in
+/// Of signals that are sampled this finely the filter keeps every eighth value. Their noise has the same size in
 /// each sample, most of it above the band.
 #[test]
 fn finely_sampled_signals_lose_nothing() {
