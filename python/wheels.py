@@ -11,6 +11,7 @@ import pathlib
 import platform
 import re
 import shutil
+import subprocess
 import sys
 import time
 import zipfile
@@ -52,6 +53,12 @@ def target_of(processor):
     return f"{processor}-unknown-linux-gnu"
 
 
+def has_library(target):
+    """Whether Rust's library for a target is there, as that of this machine is without rustup, too."""
+    where = subprocess.run(["rustc", "--print", "sysroot"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
+    return (pathlib.Path(where.stdout.strip()) / "lib" / "rustlib" / target).is_dir()
+
+
 def program(work, processor, profile):
     """Where the program for a processor is built."""
     folder = "debug" if profile == "dev" else profile
@@ -61,7 +68,8 @@ def program(work, processor, profile):
 def build(python, work, processor, profile, variables):
     """Builds one wheel, and says what it is."""
     target = target_of(processor)
-    run(["rustup", "target", "add", target], ROOT)
+    if not has_library(target):
+        run(["rustup", "target", "add", target], ROOT)
     # Without what only a debugger needs.
     lean = {f"CARGO_PROFILE_{profile.upper()}_{key}": value for key, value in (("DEBUG", "false"), ("STRIP", "symbols"))}
     variables = variables | lean | {"CARGO_TARGET_DIR": str(work / "target")}
