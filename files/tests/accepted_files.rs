@@ -261,7 +261,7 @@ fn a_complete_job_means_what_it_says() {
                 amplitude: 99.0,
                 pulse: PulseForm::Tone { cycles: 4.5 },
                 guided_wave_frequency: Some(0.2e6),
-                a0_in_fluids: true,
+                a0_in_fluids: false,
                 element_width: 0.5e-3,
                 source: Source { x1: 1e-3, x3: 3e-3 },
                 receivers: Receivers { first_x1: 13e-3, pitch: 0.9e-3, count: 12, x3: 2.5e-3 },

@@ -81,6 +81,8 @@ fn setup() -> impl Strategy<Value = Setup> {
             let bone_attenuation = attenuations[1];
             // Elements of a width are computed in one fluid alone.
             let element_width = if coupling.sublayers.is_empty() { pulse.3 * pitch } else { 0.0 };
+            // A0 between fluids is that of single ones.
+            let are_single = coupling.sublayers.is_empty() && marrow.sublayers.is_empty();
             (coupling.attenuation, marrow.attenuation) = (attenuations[0], attenuations[2]);
             Setup {
                 layers: Layers { coupling, bone_thickness, bone_attenuation, marrow },
@@ -89,7 +91,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                     amplitude: pulse.1,
                     pulse: pulse.2,
                     guided_wave_frequency: bidirectional.then_some(0.2 * pulse.0),
-                    a0_in_fluids: bidirectional,
+                    a0_in_fluids: bidirectional && are_single,
                     element_width,
                     source: Source { x1, x3 },
                     receivers: Receivers { first_x1, pitch, count, x3: receivers_x3 },

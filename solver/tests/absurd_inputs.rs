@@ -255,8 +255,8 @@ properties! {
         }
         check_traces(&solver, &bone);
         let waves = solver.guided_waves(&bone);
-        for wave in [waves.a0, waves.s0] {
-            let wave = wave.unwrap();
+        prop_assert!(waves.a0.is_some() != waves.a0_radiates && waves.s0.is_some(), "{waves:?}");
+        for wave in [waves.a0, waves.s0].into_iter().flatten() {
             let phase = wave.phase_velocity;
             prop_assert!(phase > 0.0 && phase < 1.001 * speed_bound(&setup, &bone), "{waves:?}");
             prop_assert!(wave.group_velocity.is_finite(), "{waves:?}");
