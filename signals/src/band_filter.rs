@@ -24,7 +24,7 @@ const SAMPLES_PER_PERIOD: f64 = 12.0;
 pub(crate) struct BandFilter {
     /// An odd number of weights, which are the same from both ends.
     weights: Vec<f64>,
-    /// Of how many samples one is kept.
+    /// Number of samples from one that is kept to the next: 1 keeps all.
     stride: usize,
 }
 
@@ -44,7 +44,7 @@ impl BandFilter {
         Self { weights, stride }
     }
 
-    /// Returns of how many samples [`BandFilter::apply`] keeps one.
+    /// Returns the number of samples from one that [`BandFilter::apply`] keeps to the next.
     pub(crate) fn stride(&self) -> usize {
         self.stride
     }

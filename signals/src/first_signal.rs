@@ -1,4 +1,5 @@
-//! What else the first signal tells: its other extremum, its decay along the array, and its frequency.
+//! Observables of a measured first signal besides its velocity: the velocity of its other extremum, its decay
+//! along the array, and its frequency.
 //!
 //! The definitions are the model's (`osteon_solver::first_signal`).
 

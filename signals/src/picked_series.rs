@@ -93,23 +93,11 @@ struct SeriesJson<'a> {
     failure: Option<PickFailure>,
     detail: Option<&'a str>,
     directions: Option<[f64; 2]>,
-    other_velocity: Option<MeasuredJson>,
-    decay: Option<MeasuredJson>,
-    center_frequency: Option<MeasuredJson>,
+    other_velocity: Option<MeasuredValue>,
+    decay: Option<MeasuredValue>,
+    center_frequency: Option<MeasuredValue>,
     receivers: Vec<ReceiverJson>,
     waves: Vec<WaveJson>,
-}
-
-#[derive(Serialize)]
-struct MeasuredJson {
-    value: f64,
-    standard_error: f64,
-}
-
-impl From<MeasuredValue> for MeasuredJson {
-    fn from(MeasuredValue { value, standard_error }: MeasuredValue) -> Self {
-        Self { value, standard_error }
-    }
 }
 
 #[derive(Serialize)]
@@ -126,7 +114,7 @@ struct ReceiverJson {
     x1: f64,
     time: Option<f64>,
     standard_error: Option<f64>,
-    amplitude: Option<MeasuredJson>,
+    amplitude: Option<MeasuredValue>,
     failure: Option<PickFailure>,
 }
 
@@ -144,7 +132,6 @@ pub fn to_json(
         let receivers = receivers.map(|(&x1, receiver)| {
             let &ReceiverPick { time, standard_error, amplitude, failure } = receiver;
             let standard_error = time.map(|_| standard_error);
-            let amplitude = amplitude.map(MeasuredJson::from);
             ReceiverJson { x1, time, standard_error, amplitude, failure }
         });
         (estimate, receivers.collect())
@@ -163,9 +150,9 @@ pub fn to_json(
                     failure: picked.refusal().map(|it| it.failure),
                     detail: picked.refusal().map(|it| it.detail.as_str()),
                     directions: picked.pick.directions,
-                    other_velocity: first.other_velocity.map(MeasuredJson::from),
-                    decay: first.decay.map(MeasuredJson::from),
-                    center_frequency: first.center_frequency.map(MeasuredJson::from),
+                    other_velocity: first.other_velocity,
+                    decay: first.decay,
+                    center_frequency: first.center_frequency,
                     receivers,
                     waves: picked.waves.iter().map(wave_json).collect(),
                 }

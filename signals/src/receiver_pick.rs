@@ -1,5 +1,7 @@
 //! What is known of the signal of one receiver.
 
+use serde::Serialize;
+
 use crate::pick_failure::PickFailure;
 
 /// What one receiver contributed.
@@ -17,7 +19,7 @@ pub struct ReceiverPick {
 }
 
 /// A measured number.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MeasuredValue {
     /// The number.
     pub value: f64,

@@ -6,7 +6,7 @@
 /// Colours and strokes of the charts of a page.
 pub(crate) const STYLE: &str = include_str!("chart.css");
 
-/// What stands for the colour of an element's class.
+/// The variable in the stylesheet whose value is the colour of the element's class.
 const CLASS_COLOUR: &str = "var(--c)";
 
 /// Returns [`STYLE`] for a light page, without variables.

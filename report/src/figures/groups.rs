@@ -91,9 +91,9 @@ struct ForestPlot {
     name: &'static str,
     title: &'static str,
     label: &'static str,
-    /// What each group has by itself.
+    /// Value and interval of each group, from its own data alone.
     own: Vec<ForestRow>,
-    /// What it has with the help of the others; empty where nothing is pooled.
+    /// Value and interval of each group after pooling with the others; empty where nothing is pooled.
     pooled: Vec<ForestRow>,
 }
 

@@ -1,4 +1,4 @@
-//! What groups share, as a table.
+//! The table of pooled groups: mean and scatter of each quantity over all groups.
 
 use osteon_common::parameters::Parameter;
 use osteon_files::report::{GroupPooling, PooledValue};
